@@ -567,7 +567,7 @@ inline void PathTracer::go_on(Batch& v, std::size_t i, const BsdfSample& next, c
   ++path.bounce;
   path.last_density = next.density;
   path.since_last = 0.0f;
-  path.spread = std::max(path.spread, next.spread);
+  path.spread = std::max(path.spread, std::min(next.spread, kMostSpread));
   v.go_on(path, origin, direction, behind);
 }
 

@@ -9,6 +9,11 @@ namespace diorama {
 inline constexpr float kContinuation = 1.5f;
 inline constexpr float kShortContinuation = 0.7f;
 
+// Metres per metre that the width over which paths read textures grows by at scattering surfaces.
+// As wide as their lobes, they would take the mean of lit and unlit parts of a surface: a sunny patch
+// on a floor of tiles would look too bright or too dark. Lower is exact and slow: caches miss.
+inline constexpr float kMostSpread = 0.01f;
+
 /// How the light paths of a picture go, whatever traces them.
 struct PathSettings {
   int max_bounces = 6;  ///< Surfaces after the first that may scatter light.

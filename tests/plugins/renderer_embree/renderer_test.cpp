@@ -228,6 +228,60 @@ TEST_CASE("a panel with a picture lights a floor by the closed form", "[renderer
   CHECK(statistics(render(world, camera, reference(512))).mean == Approx(expected).epsilon(0.02));
 }
 
+TEST_CASE("a floor whose white stripes alone are in the sun lights a wall by the closed form",
+          "[renderer]") {
+  // Where paths read the floor's texture as widely as they spread, black and white are one grey.
+  constexpr int kStripes = 8;
+  constexpr int kTexels = 32;  // Of a stripe.
+  constexpr double kSide = 2.0;
+  constexpr double kWidth = kSide / kStripes;
+  const auto middle = [](int stripe) { return (stripe + 0.5) * kWidth - 0.5 * kSide; };
+  auto stripes = std::make_shared<Texture>();
+  stripes->width = kStripes * kTexels;
+  stripes->height = 1;
+  stripes->channels = 1;
+  for (int x = 0; x < stripes->width; ++x) {
+    stripes->floats.push_back(x / kTexels % 2 == 0 ? 0.0f : 1.0f);
+  }
+  Material striped = matte(1.0f);
+  striped.base_color_texture.texture = stripes;
+  striped.base_color_texture.wrap_u = striped.base_color_texture.wrap_v = Wrap::Clamp;
+  TestWorld world;
+  world.add("floor", make_plane(kSide, kSide), striped);
+  for (int k = 0; k < kStripes; k += 2) {
+    world.add("slat", make_box(Vec3(kWidth, 3 * kSide, 0.01)), matte(0.0f), at(middle(k), 0, 1.5));
+  }
+  constexpr double kIlluminance = 7.0;
+  Light sun;
+  sun.kind = LightKind::Distant;
+  sun.color = Vec3f::Constant(float(kIlluminance));
+  sun.angle_rad = 1e-3;
+  world.add(sun);
+  const Vec3 place(0.2, 1.1, 0.4);
+  Affine upright = at(place.x(), place.y(), place.z());
+  upright.linear() = Mat3(Eigen::AngleAxisd(0.5 * kPi, Vec3::UnitX()));
+  world.add("wall", make_plane(0.1, 0.1), matte(0.8f), upright);
+
+  constexpr int kSteps = 200;
+  double factor = 0.0;
+  for (int k = 1; k < kStripes; k += 2) {
+    for (int i = 0; i < kSteps; ++i) {
+      for (int j = 0; j < kSteps; ++j) {
+        const Vec3 from(middle(k) + ((i + 0.5) / kSteps - 0.5) * kWidth,
+                        ((j + 0.5) / kSteps - 0.5) * kSide, 0.0);
+        const Vec3 to = place - from;
+        factor += to.z() * to.y() / (kPi * to.squaredNorm() * to.squaredNorm());
+      }
+    }
+  }
+  factor *= kWidth * kSide / (kSteps * kSteps);
+  const NodeId camera = world.add_camera(8, 6, 2000.0, place + Vec3(0.3, -1.0, 0.2), place);
+  EmbreeRenderer::Params params = reference(2048, 1);
+  params.path_reuse = GENERATE(false, true);
+  CHECK(statistics(render(world, camera, params)).mean ==
+        Approx(0.8 * factor * kIlluminance / kPi).epsilon(0.02));
+}
+
 TEST_CASE("light between two parallel bounces follows the geometric series", "[renderer]") {
   // Inside a closed sphere of albedo a with its own glow 1, radiance is 1 / (1 - a) everywhere.
   TestWorld world;
