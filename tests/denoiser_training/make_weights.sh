@@ -12,6 +12,7 @@
 #   GPUS           that train, as 0,1,2                          (0)
 #   RENDER_DEVICE  Vulkan device that renders beside THREADS     (none)
 #   RENDERERS      processes on it                               (12)
+#   RENDER_MINUTES that are rendered, where one GPU does all     (until 20 s before the end)
 #   BEGIN_FROM     weights to begin with                         (none)
 #   JUDGE          folder with assets_root/ and bench/           (no judging)
 #   JUDGED_SETS    numbers of the sets to judge by               (0 1 2 3 4 5 6 7 8)
@@ -23,16 +24,21 @@ OUT=$(realpath -m "${OUT:-$STATE/result}")
 TOTAL_MINUTES=${TOTAL_MINUTES:-60}
 MINUTES=${MINUTES:-$TOTAL_MINUTES}
 THREADS=${THREADS:-$(nproc)}
+RENDER_MINUTES=${RENDER_MINUTES:-}
 PYTHON=${PYTHON:-python3}
 mkdir -p "$STATE"/{films,judged,weights,sets} "$OUT"
 cd "$STATE"
-export STATE OUT TOTAL_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
+export STATE OUT TOTAL_MINUTES RENDER_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
 export CUDA_VISIBLE_DEVICES=${GPUS:-0}
 trainers=$(tr ',' '\n' <<<"$CUDA_VISIBLE_DEVICES" | wc -l)
 [ -e since ] || date +%s >since
 since=$(<since)
 judging=$([ -n "${JUDGE:-}" ] && echo 60 || echo 5)
 until=$("$PYTHON" -c "print(int($since + 60 * $TOTAL_MINUTES - $judging))")
+render_until=$((until - 20))
+if [ -n "${RENDER_MINUTES:-}" ] && [ $((since + 60 * RENDER_MINUTES)) -lt "$render_until" ]; then
+  render_until=$((since + 60 * RENDER_MINUTES))
+fi
 
 seconds() { date +%s; }
 
@@ -49,7 +55,7 @@ render_judged() {
 render() {
   local worker=$1 number=0
   [ "$worker" -le 4 ] && [ -n "${JUDGE:-}" ] && render_judged
-  while [ "$(seconds)" -lt $((until - 20)) ]; do
+  while [ "$(seconds)" -lt "$render_until" ]; do
     number=$((number + 1))
     mkdir "sets/${worker}_$number" 2>/dev/null || continue
     nice $PROGRAM films --first $((worker * 10000 + number)) --sets 1 --views 7 \
@@ -58,9 +64,9 @@ render() {
 }
 render_on_gpu() {
   local worker=$1 number=1
-  while [ "$(seconds)" -lt $((until - 20)) ]; do
+  while [ "$(seconds)" -lt "$render_until" ]; do
     $PROGRAM films --device "$RENDER_DEVICE" --first $(((1000 + worker) * 10000 + number)) --sets 20 --views 7 \
-      --target-paths $((3 * ${TARGET_PATHS:-32})) --seconds $((until - 20 - $(seconds)))
+      --target-paths $((3 * ${TARGET_PATHS:-32})) --seconds $((render_until - $(seconds)))
     number=$((number + 20))
   done
 }

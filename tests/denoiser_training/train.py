@@ -23,7 +23,7 @@ CROP = 192
 EPSILON = 0.1  # of the relative error; 0.18 is middle grey
 SLACK = 4.0  # relative errors beyond count less: chance finds in what is compared with
 POOLS = ((4, 1.0), (16, 1.0))  # blocks of pixels whose means are compared, too, and how much they count
-EDGES_COUNT = 16.0  # by what is seen of errors
+EDGES_COUNT = 48.0  # by what is seen of errors
 REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
 # How often which number of paths is drawn, where a view has it.

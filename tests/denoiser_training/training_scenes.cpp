@@ -244,7 +244,7 @@ void hide_bulb_glasses(Scene& scene) {
 /// A cut-out of a picture of one of three sizes.
 NodeId add_cut_out(Scene& scene, int width, int height, const Vec3& eye, const Vec3& target,
                    Rng& rng) {
-  constexpr std::array<int, 5> kWidths{256, 320, 480, 640, 640};
+  constexpr std::array<int, 5> kWidths{256, 320, 320, 480, 640};
   const int whole_width = kWidths[rng.index(kWidths.size())];
   const int whole_height = whole_width * 3 / 4;
   Camera camera =
@@ -387,7 +387,7 @@ Set training_set(std::uint64_t seed, int cameras, int width, int height, Host& h
   Set set;
   set.name = "set_" + std::to_string(seed);
   Rng rng = Rng(seed).fork("denoiser training");
-  if (rng.chance(0.8)) {
+  if (rng.chance(0.7)) {
     fill_room(set, seed, cameras, width, height, rng, host);
   } else {
     fill_stage(set, cameras, width, height, rng, host);
