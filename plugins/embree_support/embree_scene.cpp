@@ -128,7 +128,7 @@ void EmbreeScene::take(const Scene& scene, const std::function<void()>& beside) 
   }
   {
     const Stopwatch watch(times_.lights_s);
-    scene_.light(scene, [this](std::span<const SkyGrid::Ray> rays) { return sees(rays); });
+    scene_.light(scene, [this](std::span<const CellGrid::Ray> rays) { return sees(rays); });
   }
   is_ready_ = true;
   if (!is_lit) beside();
@@ -154,8 +154,8 @@ EmbreeScene::Trees EmbreeScene::trees() const {
 }
 
 /// Which of the rays leave what is not movable.
-std::uint32_t EmbreeScene::sees(std::span<const SkyGrid::Ray> rays) const {
-  static_assert(SkyGrid::kMostRays <= RayPacket8::kSize);
+std::uint32_t EmbreeScene::sees(std::span<const CellGrid::Ray> rays) const {
+  static_assert(CellGrid::kMostRays <= RayPacket8::kSize);
   RayPacket8 packet;
   packet.clear();
   for (const auto& [origin, direction] : rays) {

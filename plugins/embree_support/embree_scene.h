@@ -256,7 +256,7 @@ class EmbreeScene {
   embree::GeometryHandle new_instance(const ShadingMesh& mesh) const;
   void blur();
   embree::GeometryHandle make_moving(std::uint32_t number);
-  std::uint32_t sees(std::span<const SkyGrid::Ray> rays) const;
+  std::uint32_t sees(std::span<const CellGrid::Ray> rays) const;
   void check_device(const char* action) const;
 
   Host& host_;

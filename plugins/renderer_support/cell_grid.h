@@ -5,6 +5,8 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
+#include <span>
 
 #include "batch.h"
 
@@ -19,6 +21,15 @@ class CellGrid {
   /// one.
   static constexpr float kNeighbourShare = 0.2f;
   static constexpr float kUnseenShare = 0.003f;
+
+  /// From a cell, world space.
+  struct Ray {
+    Vec3f origin;
+    Vec3f direction;
+  };
+  static constexpr std::size_t kMostRays = 8;
+  /// Which of up to kMostRays rays leave the scene: one bit each, the first lowest.
+  using Sees = std::function<std::uint32_t(std::span<const Ray> rays)>;
 
   /// One cell for all places.
   CellGrid() = default;

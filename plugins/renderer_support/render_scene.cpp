@@ -90,7 +90,7 @@ bool RenderScene::take(const Scene& scene) {
   return true;
 }
 
-void RenderScene::light(const Scene& scene, const SkyGrid::Sees& sees) {
+void RenderScene::light(const Scene& scene, const CellGrid::Sees& sees) {
   if (!needs_light_) return;
   lights_ = LightTable(options_.has_disk_lamps);
   add_lights(scene);
@@ -372,7 +372,7 @@ auto grid_of(const std::vector<Cached>& kept, std::vector<Cached>& used, const K
 }  // namespace
 
 // Only what stays counts, so that the grids are the same whatever moved before, and are kept.
-void RenderScene::learn_surroundings(const SkyGrid::Sees& sees) {
+void RenderScene::learn_surroundings(const CellGrid::Sees& sees) {
   Surroundings now = surroundings();
   if (!(now == surroundings_)) {
     sky_grids_.clear();

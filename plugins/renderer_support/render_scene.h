@@ -34,7 +34,7 @@ class RenderScene {
   bool take(const Scene& scene);
   /// Makes the tables of lights, if anything they depend on has changed. `sees` asks for the rays
   /// of SkyGrid among what is not movable.
-  void light(const Scene& scene, const SkyGrid::Sees& sees);
+  void light(const Scene& scene, const CellGrid::Sees& sees);
   /// Whether light() has nothing to do.
   bool is_lit() const { return !needs_light_; }
 
@@ -115,7 +115,7 @@ class RenderScene {
   void add_emitters();
   void add_emitters(std::uint32_t instance, std::size_t slot,
                     std::span<std::uint32_t> triangle_lights);
-  void learn_surroundings(const SkyGrid::Sees& sees);
+  void learn_surroundings(const CellGrid::Sees& sees);
   Surroundings surroundings() const;
 
   Host& host_;

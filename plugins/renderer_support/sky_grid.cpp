@@ -28,7 +28,7 @@ SkyGrid::SkyGrid(const DomeTexture& dome) {
 }
 
 SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
-                 const Aabb& bounds, const Sees& sees, Host& host)
+                 const Aabb& bounds, const CellGrid::Sees& sees, Host& host)
     : grid_(bounds) {
   const std::vector<Shares> seen = look_around(dome, world_from_dome, sees, host);
   cells_.resize(seen.size());
@@ -42,7 +42,7 @@ SkyGrid::SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome
 // The rest goes to what lies between, which in a room are the ways through its windows.
 std::vector<SkyGrid::Shares> SkyGrid::look_around(const DomeTexture& dome,
                                                   const Eigen::Matrix3f& world_from_dome,
-                                                  const Sees& sees, Host& host) const {
+                                                  const CellGrid::Sees& sees, Host& host) const {
   float total = 0.0f;
   for (int patch = 0; patch < DomeTexture::kPatches; ++patch) total += dome.patch_power(patch);
   RayCounts first{};
@@ -101,11 +101,12 @@ bool SkyGrid::may_be_seen_in_part(const std::vector<Shares>& seen, std::size_t c
 }
 
 SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
-                                   const Eigen::Matrix3f& world_from_dome, const Sees& sees,
-                                   const RayCounts& before, const RayCounts& counts) const {
+                                   const Eigen::Matrix3f& world_from_dome,
+                                   const CellGrid::Sees& sees, const RayCounts& before,
+                                   const RayCounts& counts) const {
   Shares seen{};
-  std::array<Ray, kMostRays> rays;
-  std::array<std::pair<int, float>, kMostRays>
+  std::array<CellGrid::Ray, CellGrid::kMostRays> rays;
+  std::array<std::pair<int, float>, CellGrid::kMostRays>
       gains;  ///< Patch and share that each ray stands for.
   std::size_t waiting = 0;
   const auto trace = [&] {
@@ -131,7 +132,7 @@ SkyGrid::Shares SkyGrid::seen_from(std::size_t index, const DomeTexture& dome,
           world_from_dome * DomeTexture::towards(dome.sample(patch, u).place).direction;
       rays[waiting] = {origin, direction};
       gains[waiting] = {patch, 1.0f / float(count)};
-      if (++waiting == kMostRays) trace();
+      if (++waiting == CellGrid::kMostRays) trace();
     }
   }
   if (waiting > 0) trace();

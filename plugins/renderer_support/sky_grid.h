@@ -4,8 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
-#include <functional>
-#include <span>
 #include <vector>
 
 #include "cell_grid.h"
@@ -18,20 +16,11 @@ namespace diorama {
 /// room, the window. Light samples go there; a rest goes everywhere, because the grid may be wrong.
 class SkyGrid {
  public:
-  /// Towards the sky; world space.
-  struct Ray {
-    Vec3f origin;
-    Vec3f direction;
-  };
-  static constexpr std::size_t kMostRays = 8;
-  /// Which of up to kMostRays rays leave the scene: one bit each, the first lowest.
-  using Sees = std::function<std::uint32_t(std::span<const Ray> rays)>;
-
   /// One cell that sees everything.
   explicit SkyGrid(const DomeTexture& dome);
   /// By rays from random places of each cell: few at first, more where they do not agree.
   SkyGrid(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome, const Aabb& bounds,
-          const Sees& sees, Host& host);
+          const CellGrid::Sees& sees, Host& host);
 
   const CellGrid& grid() const { return grid_; }
   /// Borders of the patches' shares in a cell, from 0 to 1.
@@ -63,11 +52,11 @@ class SkyGrid {
   using RayCounts = std::array<int, DomeTexture::kPatches>;
   /// By cell: which share of each patch can be seen.
   std::vector<Shares> look_around(const DomeTexture& dome, const Eigen::Matrix3f& world_from_dome,
-                                  const Sees& sees, Host& host) const;
+                                  const CellGrid::Sees& sees, Host& host) const;
   bool may_be_seen_in_part(const std::vector<Shares>& seen, std::size_t cell, int patch) const;
   /// By `counts` rays; `before`: how many the cell had.
   Shares seen_from(std::size_t cell, const DomeTexture& dome,
-                   const Eigen::Matrix3f& world_from_dome, const Sees& sees,
+                   const Eigen::Matrix3f& world_from_dome, const CellGrid::Sees& sees,
                    const RayCounts& before, const RayCounts& counts) const;
   Shares with_neighbours(const std::vector<Shares>& seen, std::size_t cell) const;
 

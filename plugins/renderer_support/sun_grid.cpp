@@ -17,16 +17,16 @@ constexpr std::uint64_t kFurtherSunRays = 224;
 }  // namespace
 
 SunGrid::SunGrid(const Vec3f& towards, float one_minus_cos, const Aabb& bounds,
-                 const SkyGrid::Sees& sees, Host& host)
+                 const CellGrid::Sees& sees, Host& host)
     : grid_(bounds) {
   const Basis axes = basis_around(towards);
   const auto seen_from = [&](std::size_t cell, std::uint64_t begin, std::uint64_t end) {
     std::uint64_t key = (cell * (kFirstSunRays + kFurtherSunRays) + begin) * 5;
     const auto next = [&] { return unit_fraction(mix_bits(++key * 0x9E3779B97F4A7C15u)); };
     int seen = 0;
-    std::array<SkyGrid::Ray, SkyGrid::kMostRays> rays;
+    std::array<CellGrid::Ray, CellGrid::kMostRays> rays;
     for (std::uint64_t i = begin; i < end; i += rays.size()) {
-      for (SkyGrid::Ray& ray : rays) {
+      for (CellGrid::Ray& ray : rays) {
         const Vec3f within(next(), next(), next());
         const Vec2f u(next(), next());
         ray = {grid_.place(cell, within), axes.to_world(uniform_cone(u, one_minus_cos))};

@@ -6,7 +6,6 @@
 
 #include "cell_grid.h"
 #include "diorama/host.h"
-#include "sky_grid.h"
 
 namespace diorama {
 
@@ -18,7 +17,7 @@ class SunGrid {
   SunGrid() = default;
   /// By rays `towards` it (unit, world space) from random places of each cell, within a cone of
   /// `one_minus_cos` of its half angle: few at first, more where they do not agree.
-  SunGrid(const Vec3f& towards, float one_minus_cos, const Aabb& bounds, const SkyGrid::Sees& sees,
+  SunGrid(const Vec3f& towards, float one_minus_cos, const Aabb& bounds, const CellGrid::Sees& sees,
           Host& host);
 
   const CellGrid& grid() const { return grid_; }

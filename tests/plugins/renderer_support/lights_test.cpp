@@ -234,7 +234,7 @@ TEST_CASE("a distant light is chosen where it is seen", "[lights]") {
   lights.finish();
   test::RenderHost host(2);
   const Aabb bounds{Vec3(-3, -3, -1.5), Vec3(3, 3, 1.5)};
-  const auto sees = [](std::span<const SkyGrid::Ray> rays) {
+  const auto sees = [](std::span<const CellGrid::Ray> rays) {
     std::uint32_t lit = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) lit |= std::uint32_t(rays[i].origin.x() > 0) << i;
     return lit;

@@ -108,7 +108,7 @@ TEST_CASE("a dome is sampled as bright as it is", "[sampling]") {
   test::RenderHost host(2);
   const SkyGrid everything(dome);
   const Aabb bounds{Vec3(-2, -1, -3), Vec3(2, 4, 3)};
-  const auto sees = [](std::span<const SkyGrid::Ray> rays) {
+  const auto sees = [](std::span<const CellGrid::Ray> rays) {
     std::uint32_t lit = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       lit |= std::uint32_t(rays[i].origin.x() > 0.0f || rays[i].direction.y() > 0.6f) << i;
@@ -156,12 +156,12 @@ TEST_CASE("a room's cells know what they see through its window", "[sampling]") 
   const DomeTexture dome(white);
   test::RenderHost host(2);
   const Aabb bounds{Vec3(0, 0, 0), Vec3(5, 4, 3)};
-  const auto is_through_window = [](const SkyGrid::Ray& ray) {
+  const auto is_through_window = [](const CellGrid::Ray& ray) {
     if (ray.direction.y() <= 0.0f) return false;
     const Vec3f p = ray.origin + (4.0f - ray.origin.y()) / ray.direction.y() * ray.direction;
     return p.x() > 1.0f && p.x() < 2.2f && p.z() > 1.0f && p.z() < 2.0f;
   };
-  const auto sees = [&](std::span<const SkyGrid::Ray> rays) {
+  const auto sees = [&](std::span<const CellGrid::Ray> rays) {
     std::uint32_t lit = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       lit |= std::uint32_t(is_through_window(rays[i])) << i;
@@ -207,7 +207,7 @@ TEST_CASE("a room's cells know from which share of them the sun is seen", "[samp
   const Aabb bounds{Vec3(0, 0, 0), Vec3(6, 4.8, 3)};
   std::atomic<std::size_t> asked = 0;
   std::atomic<bool> is_off = false;
-  const auto sees = [&](std::span<const SkyGrid::Ray> rays) {
+  const auto sees = [&](std::span<const CellGrid::Ray> rays) {
     std::uint32_t lit = 0;
     for (std::size_t i = 0; i < rays.size(); ++i) {
       ++asked;
