@@ -537,6 +537,7 @@ int main(int argc, char** argv) {
   app.add_option("--threads", threads);
   CLI11_PARSE(app, argc, argv);
   try {
+    std::filesystem::create_directories(folder);
     test::RenderHost host(threads);
     const std::vector<std::pair<std::string, void (*)(const std::filesystem::path&, Host&)>> sheets{
         {"lights", &draw_lights},   {"surfaces", &draw_surfaces}, {"rooms", &draw_rooms},

@@ -54,6 +54,8 @@ void write_png(const Host& host, const Image<Rgba8>& image, const std::filesyste
   const auto bytes = host.encode_image(view, ImageFormat::Png);
   std::ofstream out(file, std::ios::binary);
   out.write(reinterpret_cast<const char*>(bytes.data()), std::streamsize(bytes.size()));
+  out.close();
+  if (!out) throw Error(ErrorKind::Output, file.string() + ": cannot be written");
 }
 
 }  // namespace diorama::test
