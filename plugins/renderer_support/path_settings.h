@@ -11,8 +11,8 @@ inline constexpr float kShortContinuation = 0.7f;
 
 // Metres per metre that the width over which paths read textures grows by at scattering surfaces.
 // As wide as their lobes, they would take the mean of lit and unlit parts of a surface: a sunny
-// patch on a floor of tiles would look too bright or too dark by up to 1.5 % of a room's light, and
-// does by 0.1 % at most so (measured). Finer reading takes time: caches miss.
+// patch on a floor of tiles would be off by up to 1.5 % of a room's light; 0.1 % of it is left at
+// most (measured). Finer reading takes time: caches miss.
 inline constexpr float kMostSpread = 0.01f;
 
 /// How the light paths of a picture go, whatever traces them.

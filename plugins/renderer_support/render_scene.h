@@ -33,7 +33,7 @@ class RenderScene {
   /// light().
   bool take(const Scene& scene);
   /// Makes the tables of lights, if anything they depend on has changed. `sees` asks for the rays
-  /// of SkyGrid among what is not movable.
+  /// of CellGrid among what is not movable.
   void light(const Scene& scene, const CellGrid::Sees& sees);
   /// Whether light() has nothing to do.
   bool is_lit() const { return !needs_light_; }

@@ -131,6 +131,7 @@ void GpuPathTracer::begin(const View& view, const PathSettings& settings, const 
   job_.has_caustics = settings.has_caustics ? 1 : 0;
   job_.indirect_share = settings.indirect_share;
   job_.continuation = settings.continuation;
+  job_.most_spread = kMostSpread;
   job_.pixel_angle = view.pixel_angle();
   if (pinhole) {
     job_.camera = pinhole->origin;

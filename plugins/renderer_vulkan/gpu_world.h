@@ -287,6 +287,7 @@ struct Job {
   std::uint32_t has_caustics = 0;
   float indirect_share = 1.0f;
   float continuation = 1.0f;
+  float most_spread = 0.0f;
   float pixel_angle = 0.0f;
   Vec3f cache_eye = Vec3f::Zero();
   Vec3f camera = Vec3f::Zero();

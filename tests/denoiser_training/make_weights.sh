@@ -24,11 +24,10 @@ OUT=$(realpath -m "${OUT:-$STATE/result}")
 TOTAL_MINUTES=${TOTAL_MINUTES:-60}
 MINUTES=${MINUTES:-$TOTAL_MINUTES}
 THREADS=${THREADS:-$(nproc)}
-RENDER_MINUTES=${RENDER_MINUTES:-}
 PYTHON=${PYTHON:-python3}
 mkdir -p "$STATE"/{films,judged,weights,sets} "$OUT"
 cd "$STATE"
-export STATE OUT TOTAL_MINUTES RENDER_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
+export STATE OUT TOTAL_MINUTES THREADS PYTHONUNBUFFERED=1 OMP_NUM_THREADS=2
 export CUDA_VISIBLE_DEVICES=${GPUS:-0}
 trainers=$(tr ',' '\n' <<<"$CUDA_VISIBLE_DEVICES" | wc -l)
 [ -e since ] || date +%s >since
@@ -36,9 +35,8 @@ since=$(<since)
 judging=$([ -n "${JUDGE:-}" ] && echo 60 || echo 5)
 until=$("$PYTHON" -c "print(int($since + 60 * $TOTAL_MINUTES - $judging))")
 render_until=$((until - 20))
-if [ -n "${RENDER_MINUTES:-}" ] && [ $((since + 60 * RENDER_MINUTES)) -lt "$render_until" ]; then
-  render_until=$((since + 60 * RENDER_MINUTES))
-fi
+wanted=$((since + 60 * ${RENDER_MINUTES:-TOTAL_MINUTES}))
+[ "$wanted" -lt "$render_until" ] && render_until=$wanted
 
 seconds() { date +%s; }
 

@@ -241,7 +241,7 @@ void hide_bulb_glasses(Scene& scene) {
   }
 }
 
-/// A cut-out of a picture of one of three sizes.
+/// A cut-out of a picture of one of four sizes.
 NodeId add_cut_out(Scene& scene, int width, int height, const Vec3& eye, const Vec3& target,
                    Rng& rng) {
   constexpr std::array<int, 5> kWidths{256, 320, 320, 480, 640};

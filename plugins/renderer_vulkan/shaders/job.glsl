@@ -103,6 +103,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   uint has_caustics;
   float indirect_share;
   float continuation;
+  float most_spread;  // of a lobe, for what textures are read over
   float pixel_angle;
   vec3 cache_eye;
   vec3 camera;

@@ -316,8 +316,6 @@ uint pass_or_reflect(inout Path path, uint material, uint material_flags, Surfac
   return dot(s.flat_normal, reflection) > 0.0 ? kGoesOn : kEnds;
 }
 
-const float kMostSpread = 0.01;  // As in path_settings.h.
-
 // True: along a new ray.
 bool go_on(inout Path path, vec3 weight, float density, float spread, float roulette, vec3 origin,
            vec3 direction) {
@@ -335,7 +333,7 @@ bool go_on(inout Path path, vec3 weight, float density, float spread, float roul
   ++path.bounce;
   path.last_density = density;
   path.since_last = 0.0;
-  path.spread = max(path.spread, min(spread, kMostSpread));
+  path.spread = max(path.spread, min(spread, job.most_spread));
   path.origin = origin;
   path.direction = direction;
   return true;
