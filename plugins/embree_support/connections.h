@@ -118,11 +118,7 @@ inline void Connections::choose(const Vertices& v, const VirtualLights& lights,
     }
     const std::uint32_t number = lights.number_of_candidate(u[i], best);
     chosen_[i] = &lights.lights()[number];
-    const auto* bytes = reinterpret_cast<const std::byte*>(chosen_[i]);
-    constexpr std::size_t kLine = 64;
-    for (std::size_t at = 0; at < sizeof(VirtualLights::Light); at += kLine) {
-      __builtin_prefetch(bytes + at);
-    }
+    lights.prefetch(number);
     weight_[i] = sum / (scores_[best][i] * float(kCandidates));
     rival_[i] = float(kCandidates) * lights.candidates()[number].density;
   }

@@ -321,6 +321,7 @@ inline void PathTracer::process_hits(Batch& v) const {
     const ShadingMaterial& material = instance->material(std::uint32_t(v.hits.triangle[i]));
     if (path.bounce > settings_.max_bounces && !material.emits) continue;
     v.material[i] = &material;
+    if (material.reads_uv) instance->shading->prefetch_uvs(std::uint32_t(v.hits.triangle[i]));
     v.interpolated.set(i, interpolated_normal(v.hits.at(i)));
     v.is_mirrored[i] = instance->is_mirrored;
   }

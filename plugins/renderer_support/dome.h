@@ -27,7 +27,11 @@ class SquareDistribution {
     Vec2f point;
     float density = 0.0f;
   };
-  Draw sample(const Vec2f& u) const;
+  Draw sample(const Vec2f& u) const { return sample_row(row(u.y()), u.x()); }
+  /// The same in two steps, for many at once: the second reads a row, which may be fetched before.
+  float row(float u) const { return inverse(row_sums_.data(), height_, u); }
+  void prefetch_row(float row) const;
+  Draw sample_row(float row, float u) const;
   float density(const Vec2f& point) const {
     const int x = cell_of(point.x(), width_);
     const int y = cell_of(point.y(), height_);
@@ -82,7 +86,11 @@ class DomeTexture {
     Vec2f place;           ///< In the image.
     float density = 0.0f;  ///< Over the patch's square.
   };
-  Draw sample(int patch, const Vec2f& u) const;
+  Draw sample(int patch, const Vec2f& u) const {
+    return sample_row(patch, patches_[std::size_t(patch)].row(u.y()), u.x());
+  }
+  /// The second step of that; see SquareDistribution.
+  Draw sample_row(int patch, float row, float u) const;
 
   struct Towards {
     Vec3f direction;
@@ -143,16 +151,22 @@ class DomeCache {
   std::map<const Texture*, std::shared_ptr<Entry>> entries_;
 };
 
-inline SquareDistribution::Draw SquareDistribution::sample(const Vec2f& u) const {
-  const float y = inverse(row_sums_.data(), height_, u.y());
+inline void SquareDistribution::prefetch_row(float y) const {
+  constexpr int kFloatsPerLine = 16;
+  const float* row = &within_row_[std::size_t(y) * std::size_t(width_ + 1)];
+  for (int x = 0; x < width_; x += kFloatsPerLine) __builtin_prefetch(row + x);
+  __builtin_prefetch(row + width_);
+}
+
+inline SquareDistribution::Draw SquareDistribution::sample_row(float y, float u) const {
   const auto row = std::size_t(y);
-  const float x = inverse(&within_row_[row * std::size_t(width_ + 1)], width_, u.x());
+  const float x = inverse(&within_row_[row * std::size_t(width_ + 1)], width_, u);
   return {{x / float(width_), y / float(height_)},
           weights_[row * std::size_t(width_) + std::size_t(x)]};
 }
 
-inline DomeTexture::Draw DomeTexture::sample(int patch, const Vec2f& u) const {
-  const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample(u);
+inline DomeTexture::Draw DomeTexture::sample_row(int patch, float row, float u) const {
+  const SquareDistribution::Draw draw = patches_[std::size_t(patch)].sample_row(row, u);
   return {{(float(patch % kColumns) + draw.point.x()) / float(kColumns),
            (float(patch / kColumns) + draw.point.y()) / float(kRows)},
           draw.density};

@@ -162,13 +162,23 @@ inline void draw_dome(const LightTable& table, std::uint32_t number, const Light
   const std::size_t size = whole_steps(count);
   BatchInts cells;
   light.sky->grid().find_cells(from, size, cells);
+  // In steps, each of which knows what the next one reads.
+  std::array<SkyGrid::Choice, kBatch> choices;
+  for (std::size_t k = 0; k < count; ++k) {
+    choices[k] = light.sky->choose(std::uint32_t(cells[k]), u[index[k]]);
+  }
+  BatchFloats rows;
+  for (std::size_t k = 0; k < count; ++k) {
+    const SquareDistribution& patch = light.texture->patches()[std::size_t(choices[k].patch)];
+    rows[k] = patch.row(v[index[k]]);
+    patch.prefetch_row(rows[k]);
+  }
   BatchFloats x;
   BatchFloats y;
   BatchFloats density;
   for (std::size_t k = 0; k < count; ++k) {
-    const std::size_t i = index[k];
-    const SkyGrid::Choice choice = light.sky->choose(std::uint32_t(cells[k]), u[i]);
-    const DomeTexture::Draw draw = light.texture->sample(choice.patch, {choice.rest, v[i]});
+    const SkyGrid::Choice& choice = choices[k];
+    const DomeTexture::Draw draw = light.texture->sample_row(choice.patch, rows[k], choice.rest);
     x[k] = draw.place.x();
     y[k] = draw.place.y();
     density[k] = draw.density * choice.probability;

@@ -38,6 +38,19 @@ const SrgbBytes& srgb_bytes() {
   return bytes;
 }
 
+const std::array<float, 256>& linear_from_byte(bool is_srgb) {
+  static const auto tables = [] {
+    std::array<std::array<float, 256>, 2> made;
+    for (std::size_t i = 0; i < 256; ++i) {
+      const float value = float(i) / 255.0f;
+      made[0][i] = value;
+      made[1][i] = linear_from_srgb(value);
+    }
+    return made;
+  }();
+  return tables[is_srgb ? 1 : 0];
+}
+
 struct Size {
   int width = 0;
   int height = 0;
@@ -82,11 +95,7 @@ std::vector<T> halved(const std::vector<T>& from, const Size& size, int channels
 MipTexture::MipTexture(const Texture& source, int wide_enough)
     : source_(&source), number_(next_number()) {
   check(*source_);
-  const bool is_srgb = source_->color_space == ColorSpace::Srgb;
-  for (std::size_t i = 0; i < 256; ++i) {
-    const float value = float(i) / 255.0f;
-    linear_from_byte_[i] = is_srgb ? linear_from_srgb(value) : value;
-  }
+  linear_from_byte_ = &linear_from_byte(is_srgb());
   levels_.push_back({source_->width, source_->height, {}, {}});
   while (levels_.back().width > wide_enough &&
          (levels_.back().width > 1 || levels_.back().height > 1)) {
@@ -111,11 +120,10 @@ void MipTexture::add_level() {
         [](float mean, int) { return mean; });
   } else {
     const SrgbBytes& encoded = srgb_bytes();
+    const auto& linear = *linear_from_byte_;
     level.bytes = halved(
         is_first ? source_->bytes : old.bytes, size, channels,
-        [&](std::uint8_t byte, int c) {
-          return c == alpha ? float(byte) / 255.0f : linear_from_byte_[byte];
-        },
+        [&](std::uint8_t byte, int c) { return c == alpha ? float(byte) / 255.0f : linear[byte]; },
         [&](float mean, int c) {
           return is_srgb && c != alpha ? encoded(mean) : std::uint8_t(mean * 255.0f + 0.5f);
         });

@@ -61,7 +61,8 @@ class MipTexture {
 
   const Texture* source_;
   std::uint64_t number_;
-  std::array<float, 256> linear_from_byte_;
+  /// All textures share two of them, which stay in a processor's cache.
+  const std::array<float, 256>* linear_from_byte_;
   std::vector<Level> levels_;
 };
 
@@ -102,10 +103,10 @@ inline Rgba MipTexture::texel(int index, int x, int y) const {
       (std::size_t(y) * std::size_t(level.width) + std::size_t(x)) * std::size_t(channels);
   if (!source_->bytes.empty()) {
     const std::uint8_t* p = (index == 0 ? source_->bytes.data() : level.bytes.data()) + at;
-    const float red = linear_from_byte_[p[0]];
+    const auto& linear = *linear_from_byte_;
+    const float red = linear[p[0]];
     if (channels < 3) return {red, red, red, channels == 2 ? float(p[1]) / 255.0f : 1.0f};
-    return {red, linear_from_byte_[p[1]], linear_from_byte_[p[2]],
-            channels == 4 ? float(p[3]) / 255.0f : 1.0f};
+    return {red, linear[p[1]], linear[p[2]], channels == 4 ? float(p[3]) / 255.0f : 1.0f};
   }
   const float* p = (index == 0 ? source_->floats.data() : level.floats.data()) + at;
   const bool decode = index == 0 && source_->color_space == ColorSpace::Srgb;

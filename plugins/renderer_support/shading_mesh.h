@@ -60,6 +60,9 @@ class ShadingMesh {
   }
   /// Starts to fetch a triangle's record from memory.
   void prefetch(std::uint32_t triangle) const { __builtin_prefetch(&triangles_[triangle]); }
+  void prefetch_uvs(std::uint32_t triangle) const {
+    if (!uvs_.empty()) __builtin_prefetch(&uvs_[triangle]);
+  }
   /// Of the three corners; only with has_uvs().
   std::array<Vec2f, 3> uvs(std::uint32_t triangle) const {
     return uvs_.empty() ? source_uvs(triangle) : uvs_[triangle];

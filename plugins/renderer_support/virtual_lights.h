@@ -21,7 +21,8 @@ namespace diorama {
 /// chance. Const and shareable between threads.
 class VirtualLights {
  public:
-  struct Light {
+  /// In whole lines of a processor's cache, as surfaces choose lights all over the table.
+  struct alignas(64) Light {
     Vec3f position = Vec3f::Zero();
     Vec3f flat_normal = Vec3f::UnitZ();  ///< On the lit side, unit.
     Vec3f normal = Vec3f::UnitZ();       ///< The same for shading.
@@ -44,6 +45,14 @@ class VirtualLights {
   /// those of them that are lit, `on` their parts' sides.
   void shine(std::vector<Light> found, std::span<const std::uint32_t> on, std::size_t tried);
 
+  /// Starts to fetch what a connection with a light reads of it.
+  void prefetch(std::uint32_t number) const {
+    const Light& light = lights_[number];
+    __builtin_prefetch(&light);
+    __builtin_prefetch(&light.bsdf.row);
+    __builtin_prefetch(&light.bsdf.lobes.burley);
+  }
+
   /// Of how many one is chosen for a surface, by what it would bring.
   static constexpr std::uint32_t kCandidates = 4;
   /// By u in [0, 1); there are lights.
@@ -62,8 +71,8 @@ class VirtualLights {
   }
   std::size_t size() const { return lights_.size(); }
 
-  /// What the choice reads of a light.
-  struct Candidate {
+  /// What the choice reads of a light; none lies across two lines of a cache.
+  struct alignas(32) Candidate {
     Vec3f position;
     float density;  ///< Per square metre, of one light.
     Vec3f normal;   ///< flat_normal of the light.
