@@ -69,9 +69,10 @@ render_on_gpu() {
   done
 }
 
-# Ends what makes no step within two minutes, once there is what to train on.
+# Ends what makes no step within two minutes, once there is what to train on; to get ready it has
+# five, as kernels are compiled then, beside all that renders.
 watch() {
-  local pid=$1 now alive ready=0
+  local pid=$1 now alive ready=0 most
   touch weights/alive
   while kill -0 "$pid" 2>/dev/null; do
     sleep 2
@@ -81,9 +82,11 @@ watch() {
       [ "$(find films -name '*.films' | wc -l)" -ge 60 ] && ready=$now
       continue
     fi
-    [ "$alive" -gt "$ready" ] || alive=$ready
-    if [ $((now - alive)) -gt 120 ]; then
+    most=120
+    [ "$alive" -gt "$ready" ] || { alive=$ready && most=300; }
+    if [ $((now - alive)) -gt "$most" ]; then
       echo "training stands still: ended"
+      pkill -9 -P "$pid"  # the launcher's processes would outlive it
       kill -9 "$pid"
     fi
   done

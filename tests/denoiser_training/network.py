@@ -14,14 +14,17 @@ import torch
 import torch.nn.functional as F
 from torch import nn
 
+try:
+    import fused
+except ImportError:  # without Triton
+    fused = None
+
 CHANNELS = 19  # of a film
 FEATURES = 20  # per pixel, of the network's input
 LEVELS = 6  # of the pyramid
 FINE = 25  # taps of a level's own pixels,
 COARSE = 9  # of the next level's result,
 OWN = 9  # of the pixel's colour
-KEEP = FINE + COARSE + OWN  # number of a pixel's logit of what it counts for the next level,
-GAIN = KEEP + 1  # of how much brighter or darker it becomes
 ALIGNMENT = 32  # pixels, so that all levels have whole ones
 MIN_ALBEDO = 0.02
 TIMES_OTHERS = 4.0
@@ -212,13 +215,22 @@ def shifted(padded, k, side, height, width):
     return padded[:, :, y : y + height, x : x + width]
 
 
-def averaged(values, weights, side):
-    """Of the pixels around, by weights per tap; beside the picture is nothing."""
+def averaged(values, logits, side, coarse=None, replicates=False):
+    """Of the pixels around, and of those of the next level, by the softmax of a pixel's `logits`.
+    Beside the picture is nothing, or what is at its edge."""
+    if values.is_cuda and fused:
+        return fused.averaged(values, logits, side, coarse, replicates)
+    weights = F.softmax(logits, 1)
     height, width = values.shape[2:]
-    padded = F.pad(values, (side // 2,) * 4)
+    padded = F.pad(values, (side // 2,) * 4, mode="replicate" if replicates else "constant")
     total = 0.0
-    for k, weight in enumerate(weights.unbind(1)):
-        total = total + weight.unsqueeze(1) * shifted(padded, k, side, height, width)
+    for k in range(side * side):
+        total = total + weights[:, k : k + 1] * shifted(padded, k, side, height, width)
+    if coarse is not None:
+        padded = F.pad(coarse, (1,) * 4)
+        for k in range(COARSE):
+            part = widened(shifted(padded, k, 3, height // 2, width // 2))
+            total = total + weights[:, side * side + k : side * side + k + 1] * part
     return total
 
 
@@ -242,41 +254,31 @@ def denoised(film, logits):
     """Light and colour; `logits` are of the network: per level FINE, COARSE, (the finest) OWN, what
     the pixel counts for the next level, and its gain (the finest also: the share of the filter by
     planes, and that of the pixel as it was)."""
+    taps, own_taps, keep, gain, other, stays = logits[0].split((FINE + COARSE, OWN, 1, 1, 1, 1), 1)
+    parts = [(taps, keep, gain)] + [l.split((FINE + COARSE, 1, 1), 1) for l in logits[1:]]
     pairs, noise = [torch.cat([film.scattered, film.albedo], 1)], [film.noise]
     for level in range(LEVELS - 1):
-        at = KEEP if level == 0 else -2
-        keep = F.softmax(F.pixel_unshuffle(logits[level][:, at : at + 1], 2), 1)
+        keep = F.softmax(F.pixel_unshuffle(parts[level][1], 2), 1)
         quads = F.pixel_unshuffle(pairs[level], 2)
         b, _, h, w = keep.shape
         pairs.append((quads.view(b, 6, 4, h, w) * keep.unsqueeze(1)).sum(2))
         noise.append(F.avg_pool2d(noise[level], 2))
-    result = averaged(pairs[-1], F.softmax(logits[-1][:, :FINE], 1), 5)
+    result = averaged(pairs[-1], parts[-1][0][:, :FINE], 5)
     for level in reversed(range(LEVELS - 1)):
-        result = gained(result, logits[level + 1][:, -1:], noise[level + 1])
-        weights = F.softmax(logits[level][:, : FINE + COARSE], 1)
-        height, width = pairs[level].shape[2:]
-        total = averaged(pairs[level], weights[:, :FINE], 5)
-        padded = F.pad(result, (1,) * 4)
-        for k, weight in enumerate(weights[:, FINE:].unbind(1)):
-            part = widened(shifted(padded, k, 3, height // 2, width // 2))
-            total = total + weight.unsqueeze(1) * part
-        result = total
-    gain = 1.0 + MOST_GAIN * noise_share(noise[0]) * torch.tanh(0.5 * logits[0][:, GAIN : GAIN + 1])
+        result = gained(result, parts[level + 1][2], noise[level + 1])
+        result = averaged(pairs[level], parts[level][0], 5, result)
+    gain = 1.0 + MOST_GAIN * noise_share(noise[0]) * torch.tanh(0.5 * gain)
     irradiance = gain * result[:, :3] / result[:, 3:].clamp(min=SMALLEST)
-    weights = F.softmax(logits[0][:, FINE + COARSE : FINE + COARSE + OWN], 1)
+    height, width = film.planes.shape[2:]
     own = torch.cat([film.own_albedo, film.seen], 1)
-    height, width = own.shape[2:]
-    padded = F.pad(own, (1,) * 4, mode="replicate")
-    total = 0.0
-    for k, weight in enumerate(weights[:, :, :height, :width].unbind(1)):
-        total = total + weight.unsqueeze(1) * shifted(padded, k, 3, height, width)
-    clean = irradiance[:, :, :height, :width] * total[:, :3] + total[:, 3:]
+    own = averaged(own, own_taps[:, :, :height, :width], 3, replicates=True)
+    clean = irradiance[:, :, :height, :width] * own[:, :3] + own[:, 3:]
     # Where nothing is noisy, planes change nothing.
     needed = noise_share(noise[CALM_LEVEL], CALM)
     needed = F.interpolate(needed, scale_factor=1 << CALM_LEVEL, mode="nearest")
-    own_share = needed * torch.sigmoid(-logits[0][:, -2:-1])
+    own_share = needed * torch.sigmoid(-other)
     clean = film.planes + own_share[:, :, :height, :width] * (clean - film.planes)
-    stays = torch.sigmoid(logits[0][:, -1:, :height, :width])
+    stays = torch.sigmoid(stays[:, :, :height, :width])
     return clean + stays * (film.scattered[:, :, :height, :width] + film.seen - clean)
 
 

@@ -21,11 +21,13 @@ from network import CHANNELS, Film, Network, denoised, luminance
 MAGIC = 0x4D4C4946  # "FILM"
 CROP = 192
 EPSILON = 0.1  # of the relative error; 0.18 is middle grey
-SLACK = 4.0  # relative errors beyond count less: chance finds in what is compared with
+SLACK = 4.0  # relative errors beyond count less: chance finds in what is compared with,
+SEEN_SLACK = 0.5  # and of what is seen: by the slope in the dark a lamp would be a thousand whites
 POOLS = ((4, 1.0), (16, 1.0))  # blocks of pixels whose means are compared, too, and how much they count
 EDGES_COUNT = 48.0  # by what is seen of errors
 REACH = 4  # pixels over which light of chance finds is spread
 KEPT = 0.9995  # of the average of weights, per step
+MOST_NORM = 20.0  # of a gradient, in usual ones
 # How often which number of paths is drawn, where a view has it.
 SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
@@ -264,13 +266,13 @@ class Batch:
         return raw, floats[:, 0], floats[:, 1] * floats[:, 2], target, both[:, 6:7], floats[:, 2]
 
 
-def squared(error):
+def squared(error, slack):
     size = error.abs()
-    return torch.where(size < SLACK, error * error, SLACK * (2.0 * size - SLACK))
+    return torch.where(size < slack, error * error, slack * (2.0 * size - slack))
 
 
 def relative_error(output, target, brightness):
-    return squared((output - target) / (brightness + EPSILON))
+    return squared((output - target) / (brightness + EPSILON), SLACK)
 
 
 def seen_error(output, target, brightness):
@@ -279,7 +281,8 @@ def seen_error(output, target, brightness):
     x = brightness + 0.01
     over, under = x * (2.51 * x + 0.03), x * (2.43 * x + 0.59) + 0.14
     slope = ((5.02 * x + 0.03) * under - over * (4.86 * x + 0.59)) / (under * under)
-    return squared((output - target) * slope * (over / under) ** (1.0 / 2.2 - 1.0) / 2.2)
+    error = (output - target) * slope * (over / under) ** (1.0 / 2.2 - 1.0) / 2.2
+    return squared(error, SEEN_SLACK)
 
 
 def loss_of(output, target, edges):
@@ -355,9 +358,11 @@ class Trainee:
             is_sound = torch.isfinite(norm)
             gradient = torch.where(is_sound, gradient, torch.zeros_like(gradient))
             norm = torch.where(is_sound, norm, self.norm)
-            # Steps that are far larger than usual are cut.
+            # Steps that are far larger than usual are cut. Far larger still, they tell of a view
+            # that nobody can learn from, whose steps would lead the same way again and again.
             usual = torch.where(self.norm > 0.0, self.norm, norm)
-            gradient = gradient * (3.0 * usual / norm.clamp(min=1e-12)).clamp(max=1.0)
+            kept_share = (3.0 * usual / norm.clamp(min=1e-12)).clamp(max=1.0)
+            gradient = gradient * torch.where(norm < MOST_NORM * usual, kept_share, 0.0)
             self.norm.copy_(usual + 0.02 * (torch.minimum(norm, 3.0 * usual) - usual))
             self.first.mul_(0.9).add_(gradient, alpha=0.1)
             self.second.mul_(0.99).addcmul_(gradient, gradient, value=0.01)
