@@ -27,8 +27,7 @@ class SquareDistribution {
     Vec2f point;
     float density = 0.0f;
   };
-  Draw sample(const Vec2f& u) const { return sample_row(row(u.y()), u.x()); }
-  /// The same in two steps, for many at once: the second reads a row, which may be fetched before.
+  /// A point in two steps: its row first, which may be fetched before the second reads it.
   float row(float u) const { return inverse(row_sums_.data(), height_, u); }
   void prefetch_row(float row) const;
   Draw sample_row(float row, float u) const;

@@ -38,19 +38,6 @@ const SrgbBytes& srgb_bytes() {
   return bytes;
 }
 
-const std::array<float, 256>& linear_from_byte(bool is_srgb) {
-  static const auto tables = [] {
-    std::array<std::array<float, 256>, 2> made;
-    for (std::size_t i = 0; i < 256; ++i) {
-      const float value = float(i) / 255.0f;
-      made[0][i] = value;
-      made[1][i] = linear_from_srgb(value);
-    }
-    return made;
-  }();
-  return tables[is_srgb ? 1 : 0];
-}
-
 struct Size {
   int width = 0;
   int height = 0;

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "gpu_bytes.h"
+#include "renderer_support/srgb_bytes.h"
 
 namespace diorama {
 namespace {
@@ -445,10 +446,7 @@ void GpuScene::take_tables(const RenderScene& scene) {
     }
     lamp_triangles.push_back(blob.add(columns));
   }
-  std::vector<float> linear_from_srgb_bytes;
-  for (int i = 0; i < 256; ++i)
-    linear_from_srgb_bytes.push_back(linear_from_srgb(float(i) / 255.0f));
-  const std::size_t linear = blob.add(linear_from_srgb_bytes);
+  const std::size_t linear = blob.add(std::span<const float>(linear_from_byte(true)));
   const auto parts_transfer = transfer_to(parts_, blob.bytes(), "tables of materials and lamps");
   parts.base = parts_.address();
 

@@ -18,6 +18,21 @@ def _places(height, width, BLOCK: tl.constexpr):
 
 
 @triton.jit
+def _tap(y, x, height, width, is_pixel, k: tl.constexpr, SIDE: tl.constexpr,
+         REPLICATES: tl.constexpr):
+    """-> rows and columns of the pixels that tap k of SIDE x SIDE reads, which of them there are"""
+    v = y + (k // SIDE - SIDE // 2)
+    u = x + (k % SIDE - SIDE // 2)
+    inside = is_pixel
+    if REPLICATES:
+        v = tl.minimum(tl.maximum(v, 0), height - 1)
+        u = tl.minimum(tl.maximum(u, 0), width - 1)
+    else:
+        inside = is_pixel & (v >= 0) & (v < height) & (u >= 0) & (u < width)
+    return v, u, inside
+
+
+@triton.jit
 def _gathered(plane, at, step, inside, weight, a0, a1, a2, a3, a4, a5):
     """Adds the weighted values of six layers."""
     a0 += weight * tl.load(plane + at, inside, 0.0)
@@ -59,14 +74,7 @@ def _forth(values, logits, coarse, out, sums, height, width, stride, SIDE: tl.co
     a0, a1, a2, a3, a4, a5 = zero, zero, zero, zero, zero, zero
     plane = values + image * 6 * size
     for k in tl.static_range(fine):
-        v = y + (k // SIDE - SIDE // 2)
-        u = x + (k % SIDE - SIDE // 2)
-        inside = is_pixel
-        if REPLICATES:
-            v = tl.minimum(tl.maximum(v, 0), height - 1)
-            u = tl.minimum(tl.maximum(u, 0), width - 1)
-        else:
-            inside = is_pixel & (v >= 0) & (v < height) & (u >= 0) & (u < width)
+        v, u, inside = _tap(y, x, height, width, is_pixel, k, SIDE, REPLICATES)
         weight = tl.exp(tl.load(logit + k * size, is_pixel, 0.0) - sum_of)
         a0, a1, a2, a3, a4, a5 = _gathered(plane, v * width + u, size, inside, weight,
                                            a0, a1, a2, a3, a4, a5)
@@ -75,9 +83,7 @@ def _forth(values, logits, coarse, out, sums, height, width, stride, SIDE: tl.co
         quarter = size // 4
         below = coarse + image * 6 * quarter
         for k in tl.static_range(9):
-            v = y // 2 + (k // 3 - 1)
-            u = x // 2 + (k % 3 - 1)
-            inside = is_pixel & (v >= 0) & (v < height // 2) & (u >= 0) & (u < half)
+            v, u, inside = _tap(y // 2, x // 2, height // 2, half, is_pixel, k, 3, False)
             weight = tl.exp(tl.load(logit + (fine + k) * size, is_pixel, 0.0) - sum_of)
             a0, a1, a2, a3, a4, a5 = _gathered(below, v * half + u, quarter, inside, weight,
                                                a0, a1, a2, a3, a4, a5)
@@ -117,14 +123,7 @@ def _back_to_logits(values, logits, coarse, out, sums, gradient, found, height, 
     mean = _dot(out + image * 6 * size, at, size, is_pixel, g0, g1, g2, g3, g4, g5)
     plane = values + image * 6 * size
     for k in tl.static_range(fine):
-        v = y + (k // SIDE - SIDE // 2)
-        u = x + (k % SIDE - SIDE // 2)
-        inside = is_pixel
-        if REPLICATES:
-            v = tl.minimum(tl.maximum(v, 0), height - 1)
-            u = tl.minimum(tl.maximum(u, 0), width - 1)
-        else:
-            inside = is_pixel & (v >= 0) & (v < height) & (u >= 0) & (u < width)
+        v, u, inside = _tap(y, x, height, width, is_pixel, k, SIDE, REPLICATES)
         weight = tl.exp(tl.load(logit + k * size, is_pixel, 0.0) - sum_of)
         own = _dot(plane, v * width + u, size, inside, g0, g1, g2, g3, g4, g5)
         tl.store(to + k * size, weight * (own - mean), is_pixel)
@@ -133,9 +132,7 @@ def _back_to_logits(values, logits, coarse, out, sums, gradient, found, height, 
         quarter = size // 4
         below = coarse + image * 6 * quarter
         for k in tl.static_range(9):
-            v = y // 2 + (k // 3 - 1)
-            u = x // 2 + (k % 3 - 1)
-            inside = is_pixel & (v >= 0) & (v < height // 2) & (u >= 0) & (u < half)
+            v, u, inside = _tap(y // 2, x // 2, height // 2, half, is_pixel, k, 3, False)
             weight = tl.exp(tl.load(logit + (fine + k) * size, is_pixel, 0.0) - sum_of)
             own = _dot(below, v * half + u, quarter, inside, g0, g1, g2, g3, g4, g5)
             tl.store(to + (fine + k) * size, weight * (own - mean), is_pixel)
@@ -149,9 +146,8 @@ def _back_to_values(logits, sums, gradient, found, height, width, stride, SIDE: 
     zero = tl.zeros((BLOCK,), tl.float32)
     a0, a1, a2, a3, a4, a5 = zero, zero, zero, zero, zero, zero
     for k in tl.static_range(SIDE * SIDE):
-        v = y - (k // SIDE - SIDE // 2)
-        u = x - (k % SIDE - SIDE // 2)
-        inside = is_pixel & (v >= 0) & (v < height) & (u >= 0) & (u < width)
+        # The pixel whose tap k reads this one lies where the opposite tap would read.
+        v, u, inside = _tap(y, x, height, width, is_pixel, SIDE * SIDE - 1 - k, SIDE, False)
         there = v * width + u
         weight = tl.exp(tl.load(logits + image * stride + k * size + there, inside, 0.0)
                         - tl.load(sums + image * size + there, inside, 0.0))
@@ -169,12 +165,11 @@ def _back_to_coarse(logits, sums, gradient, found, height, width, stride, FINE: 
     zero = tl.zeros((BLOCK,), tl.float32)
     a0, a1, a2, a3, a4, a5 = zero, zero, zero, zero, zero, zero
     for k in tl.static_range(9):
-        v = y - (k // 3 - 1)
-        u = x - (k % 3 - 1)
-        inside = is_pixel & (v >= 0) & (v < height) & (u >= 0) & (u < width)
+        v, u, inside = _tap(y, x, height, width, is_pixel, 8 - k, 3, False)
         for part in tl.static_range(4):
             there = (2 * v + part // 2) * (2 * width) + 2 * u + part % 2
-            weight = tl.exp(tl.load(logits + image * stride + (FINE + k) * size + there, inside, 0.0)
+            logit = logits + image * stride + (FINE + k) * size + there
+            weight = tl.exp(tl.load(logit, inside, 0.0)
                             - tl.load(sums + image * size + there, inside, 0.0))
             a0, a1, a2, a3, a4, a5 = _gathered(gradient + image * 6 * size, there, size, inside,
                                                weight, a0, a1, a2, a3, a4, a5)
@@ -220,8 +215,8 @@ class _Average(torch.autograd.Function):
         if has_coarse and ctx.needs_input_grad[3]:
             to_coarse = torch.empty_like(coarse)
             grid = (triton.cdiv(height * width // 4, BLOCK), batch)
-            _back_to_coarse[grid](logits, sums, gradient, to_coarse, height // 2, width // 2, stride,
-                                  FINE=ctx.side**2, BLOCK=BLOCK)
+            _back_to_coarse[grid](logits, sums, gradient, to_coarse, height // 2, width // 2,
+                                  stride, FINE=ctx.side**2, BLOCK=BLOCK)
         return to_values, to_logits, None, to_coarse, None
 
 

@@ -82,8 +82,12 @@ watch() {
       [ "$(find films -name '*.films' | wc -l)" -ge 60 ] && ready=$now
       continue
     fi
-    most=120
-    [ "$alive" -gt "$ready" ] || { alive=$ready && most=300; }
+    if [ "$alive" -gt "$ready" ]; then
+      most=120
+    else
+      alive=$ready
+      most=300
+    fi
     if [ $((now - alive)) -gt "$most" ]; then
       echo "training stands still: ended"
       pkill -9 -P "$pid"  # the launcher's processes would outlive it
