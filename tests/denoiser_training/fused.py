@@ -220,6 +220,7 @@ class _Average(torch.autograd.Function):
         return to_values, to_logits, None, to_coarse, None
 
 
+@torch.compiler.disable  # is one kernel as it is
 def averaged(values, logits, side, coarse=None, replicates=False):
     return _Average.apply(values, logits, side, coarse, replicates)
 

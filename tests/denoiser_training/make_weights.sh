@@ -63,7 +63,7 @@ render() {
 render_on_gpu() {
   local worker=$1 number=1
   while [ "$(seconds)" -lt "$render_until" ]; do
-    $PROGRAM films --device "$RENDER_DEVICE" --first $(((1000 + worker) * 10000 + number)) --sets 20 --views 7 \
+    nice $PROGRAM films --device "$RENDER_DEVICE" --first $(((1000 + worker) * 10000 + number)) --sets 20 --views 7 \
       --target-paths $((3 * ${TARGET_PATHS:-32})) --seconds $((render_until - $(seconds)))
     number=$((number + 20))
   done

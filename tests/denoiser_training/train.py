@@ -33,7 +33,7 @@ SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
 FILMS_PER_VIEW = 5.3  # that are kept, on average ...
 MOST_FILMS = 6  # ... and at most
-SIZE = dict(widths=(64, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
+SIZE = dict(widths=(80, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
 
 def read_films(path):
@@ -325,14 +325,16 @@ class Trainee:
         self.count = 0
         self.found = torch.zeros(flat.numel() + 1, device=self.device)  # gradient, loss
         self.graphs = None  # of look() and of learn()
+        self.compiled_loss = self.loss_of_windows
+        if options.graphs and self.device.type == "cuda":
+            self.compiled_loss = torch.compile(self.loss_of_windows, dynamic=False)
         self.put(self.flat)
 
     def put(self, flat):
         for p, values in zip(self.parameters, flat.split(self.sizes)):
             p.data.copy_(values.view_as(p))
 
-    def look(self):
-        raw, paths, exposures, target, edges, factor = self.batch.make()
+    def loss_of_windows(self, raw, paths, exposures, target, edges, factor):
         with torch.no_grad():
             film = Film(raw, paths, exposures)
         is_cuda = self.device.type == "cuda"
@@ -346,7 +348,10 @@ class Trainee:
                 features = features.contiguous(memory_format=torch.channels_last)
             logits = self.network(features)
         scale = factor.view(-1, 1, 1, 1)
-        loss = loss_of(denoised(film, logits) * scale, target * scale, edges)
+        return loss_of(denoised(film, logits) * scale, target * scale, edges)
+
+    def look(self):
+        loss = self.compiled_loss(*self.batch.make())
         gradients = torch.autograd.grad(loss, self.parameters)
         self.found.copy_(torch.cat([g.flatten() for g in gradients] + [loss.detach().view(1)]))
 
@@ -512,7 +517,7 @@ def main():
     parser.add_argument("--tell", type=float, default=15.0, help="seconds between lines")
     parser.add_argument("--save-every", type=float, default=60.0, help="seconds")
     parser.add_argument("--no-graphs", dest="graphs", action="store_false",
-                        help="begin each piece of the GPU's work on its own")
+                        help="compile nothing, begin each piece of the GPU's work on its own")
     parser.add_argument("--device", default="cuda" if torch.cuda.is_available() else "cpu")
     options = parser.parse_args()
     options.since = options.since or time.time()
