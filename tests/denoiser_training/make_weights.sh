@@ -8,7 +8,7 @@
 #   TOTAL_MINUTES  from the first call until all is done         (60)
 #   MINUTES        that this call waits                          (TOTAL_MINUTES)
 #   THREADS        that render                                   (all)
-#   TARGET_PATHS   of each of the two films to compare with      (32; on a GPU three times as many)
+#   TARGET_PATHS   of each of the two films to compare with      (32)
 #   GPUS           that train, as 0,1,2                          (0)
 #   RENDER_DEVICE  Vulkan device that renders beside THREADS     (none)
 #   RENDERERS      processes on it                               (12)
@@ -64,7 +64,7 @@ render_on_gpu() {
   local worker=$1 number=1
   while [ "$(seconds)" -lt "$render_until" ]; do
     nice $PROGRAM films --device "$RENDER_DEVICE" --first $(((1000 + worker) * 10000 + number)) --sets 20 --views 7 \
-      --target-paths $((3 * ${TARGET_PATHS:-32})) --seconds $((render_until - $(seconds)))
+      --target-paths "${TARGET_PATHS:-32}" --seconds $((render_until - $(seconds)))
     number=$((number + 20))
   done
 }
