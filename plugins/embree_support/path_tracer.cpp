@@ -656,11 +656,7 @@ inline void PathTracer::share_surface(Batch& v, std::size_t i) const {
 
 template <int kPacketSize>
 inline void PathTracer::reuse_paths(std::vector<Path>& paths, Batch& v) const {
-  for (const Path& path : paths) {
-    constexpr std::uint32_t kKey = 0x5eed5u;  // Of numbers that nothing else draws.
-    const std::uint32_t bits = hashed_bits(kKey + hashed_bits(path.sampler.place()));
-    v.reuse->set_found(path.number, path.found, PathSampler::fraction(bits));
-  }
+  for (const Path& path : paths) v.reuse->set_found(path.number, path.found);
   const auto trace = [&](const std::uint8_t* vertices, std::size_t count,
                          const BatchVectors& origin, const BatchVectors& direction,
                          const BatchFloats& reach, auto&& seen) {
