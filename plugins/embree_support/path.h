@@ -43,8 +43,9 @@ struct PathTracer::Path {
   float spread = 0.0f;             ///< Its growth per metre.
   float time = kMoment;            ///< Share of the shutter's window.
   bool ends = false;               ///< In a RadianceCache.
-  bool has_finding = false;        ///< For a RadianceCache ...
-  RadianceCache::Finding finding;  ///< ... but for its light: what it has scattered in the end.
+  int finds_from = -1;             ///< Bounce of the finding for a RadianceCache, if it has one.
+  RadianceCache::Finding finding;  ///< With what comes from farther bounces.
+  bool has_finding() const { return finds_from >= 0; }
 
   /// Between ways to go on.
   void choose() {
@@ -152,6 +153,11 @@ inline void PathTracer::add(Path& path, int bounce, const Vec3f& radiance,
   }
   if (path.is_shared) {
     path.found.*found += value;
+    return;
+  }
+  // The light sample where the finding begins is the path's own.
+  if (path.has_finding() && bounce > path.finds_from) {
+    path.finding.light += value;
     return;
   }
   path.result.scattered += value;

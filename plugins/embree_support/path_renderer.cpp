@@ -9,8 +9,8 @@
 
 #include "diorama/error.h"
 #include "path_starts.h"
+#include "renderer_support/learning_paths.h"
 #include "renderer_support/oidn_denoiser.h"
-#include "renderer_support/radiance_cache.h"
 #include "renderer_support/sample_plan.h"
 #include "renderer_support/stopwatch.h"
 #include "renderer_support/view_transform.h"
@@ -145,7 +145,7 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
     if (ends_in_cache()) {
       // Before there is a film: what was found, in order, and at most a cell for each.
       const std::uint64_t paths = SamplePlan::most_learning_paths(pixels, params_.samples);
-      colors = std::max(colors, std::size_t(paths) * RadianceCache::kBytesPerFinding);
+      colors = std::max(colors, std::size_t(paths) * LearningPaths::kBytes);
     }
     if (params_.mode == "real_time" && params_.samples == 1) {
       colors += pixels * sizeof(RayHit);

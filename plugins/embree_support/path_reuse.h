@@ -46,9 +46,16 @@ class PathReuse {
     Vec3f by_way_on = Vec3f::Zero();  ///< farther on that way;
     Vec3f by_connection = Vec3f::Zero();
 
+    void scale(float times) {
+      for (Vec3f* light : {&by_light, &by_lamp, &by_way_on, &by_connection}) *light *= times;
+    }
     float brightest() const { return (by_light + by_lamp + by_way_on + by_connection).maxCoeff(); }
   };
-  void set_found(std::size_t path, const Found& found) { seconds_[path].found = found; }
+  /// `chance`: evenly from [0, 1), by which second surfaces are left out that bring little.
+  void set_found(std::size_t path, const Found& found, float chance) {
+    seconds_[path].found = found;
+    chances_[path] = chance;
+  }
   /// As so many a path's own way to a second surface counts beside virtual lights: about what the
   /// ways of its group are together.
   static constexpr float kOwnWays = float(PixelGroups::kPixels) * kShare;
@@ -95,6 +102,7 @@ class PathReuse {
   };
 
   void take_group(std::uint32_t group);
+  void leave_out_dark();
   void find_ways(const Second& s);
   template <bool kStacks>
   void evaluate_second(const Second& s);
@@ -110,6 +118,7 @@ class PathReuse {
   std::array<bool, kBatch> has_second_;
   std::array<First, kBatch> firsts_;
   std::array<Second, kBatch> seconds_;
+  std::array<float, kBatch> chances_;
   std::array<Vec3f, kBatch> sums_;  ///< What the first surfaces get.
 
   // By ways, from all first surfaces of a group to one second surface.
@@ -164,6 +173,32 @@ inline void PathReuse::set_second(std::size_t path, const Vertices& v, std::size
                     {},
                     rival,
                     {}};
+}
+
+/// Roulette among second surfaces, by how bright they look from their own path: to ask which others
+/// see one takes as long for a dark one as for a bright one. Below so many times the mean of a
+/// batch, they are left out by chance. It adds little noise: for brightness b the squares of all
+/// grow by sum(b * (limit - b)) < limit * sum(b), and bright ones have most of these.
+inline void PathReuse::leave_out_dark() {
+  constexpr float kLimit = 1.5f;
+  std::array<float, kBatch> brightness{};
+  float sum = 0.0f;
+  float count = 0.0f;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (!has_second_[i]) continue;
+    const Second& s = seconds_[i];
+    constexpr float kLeast = 1e-20f;
+    brightness[i] = s.found.brightest() / std::max(s.throughput.maxCoeff(), kLeast);
+    sum += brightness[i];
+    count += 1.0f;
+  }
+  if (!(sum > 0.0f)) return;
+  const float limit = kLimit * sum / count;
+  for (std::size_t i = 0; i < count_; ++i) {
+    if (!has_second_[i] || brightness[i] >= limit) continue;
+    has_second_[i] = chances_[i] * limit < brightness[i];
+    if (has_second_[i]) seconds_[i].found.scale(limit / brightness[i]);
+  }
 }
 
 /// The ways' first surfaces.
@@ -282,6 +317,7 @@ template <bool kStacks, class Trace, class Give>
 inline void PathReuse::connect(Trace&& trace, Give&& give) {
   if (count_ == 0) return;
   std::fill_n(sums_.begin(), count_, Vec3f::Zero());
+  leave_out_dark();
   for (std::uint32_t group = group_[0]; group <= group_[count_ - 1]; ++group) {
     take_group(group);
     for (std::size_t own = 0; own < ways_; ++own) {

@@ -65,14 +65,20 @@ Pixel PathTracer::place(const SampleOrder& order, int x, int y) const {
   return settings_.reuses_paths ? places(order).of(x, y) : Pixel{x, y};
 }
 
-Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const {
+Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts,
+                      const LearningPaths& learning) const {
+  const auto learnt = learning.of(jobs);
   // A picture of sums would be larger than what is left of them.
   Film film(view_.camera().width, view_.camera().height);
   std::vector<RayCounts> rays(jobs.size());
   host.parallel_for(jobs.size(), [&](std::size_t i) {
     const TraceJob& job = jobs[i];
     std::vector<PixelSum> sums(job.pixel_count());
-    rays[i] = trace(job, sums.data(), std::size_t(job.x_end - job.x_begin));
+    const int width = job.x_end - job.x_begin;
+    for (const LearningPaths::Path& path : learnt[i]) {
+      sums[std::size_t((path.y - job.y_begin) * width + path.x - job.x_begin)].add(path.sample);
+    }
+    rays[i] = trace(job, sums.data(), std::size_t(width));
     const PixelSum* sum = sums.data();
     for (int y = job.y_begin; y < job.y_end; ++y) {
       for (int x = job.x_begin; x < job.x_end; ++x) {
@@ -85,16 +91,16 @@ Film PathTracer::film(std::span<const TraceJob> jobs, Host& host, RayCounts& cou
   return film;
 }
 
-RadianceCache PathTracer::learn(std::span<const TraceJob> jobs, Host& host,
+LearningPaths PathTracer::learn(std::span<const TraceJob> jobs, Host& host,
                                 RayCounts& counts) const {
-  std::vector<std::vector<RadianceCache::Finding>> findings(jobs.size());
+  LearningPaths paths(jobs.size());
   std::vector<RayCounts> rays(jobs.size());
   host.parallel_for(jobs.size(), [&](std::size_t i) {
-    findings[i].reserve(jobs[i].path_count());
-    rays[i] = trace(jobs[i], Output{nullptr, 0, &findings[i]});
+    paths.part(i).reserve(jobs[i].path_count());
+    rays[i] = trace(jobs[i], Output{nullptr, 0, &paths.part(i)});
   });
   for (const RayCounts& own : rays) counts += own;
-  return {view_.position(), findings};
+  return paths;
 }
 
 // One kernel per instruction set: all that it calls is compiled into it, but for what is rarely
@@ -121,7 +127,7 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, const Output& output
   paths.reserve(kBatch);
   Batch batch;
   batch.own_bsdfs.reserve(kBatch);
-  batch.learns = output.findings != nullptr;
+  batch.learns = output.learning != nullptr;
   if (settings_.reuses_paths) batch.reuse = std::make_unique<PathReuse>();
   const std::uint32_t run = batch.reuse ? PathReuse::kSamples : kRun;
   for (std::uint32_t begin = job.sample_begin; begin < job.sample_end; begin += run) {
@@ -140,14 +146,16 @@ inline RayCounts PathTracer::trace_all(const TraceJob& job, const Output& output
       trace_batch<kPacketSize>(batch);
       if (batch.reuse) reuse_paths<kPacketSize>(paths, batch);
       for (Path& path : paths) {
-        if (!output.findings) {
-          const auto row = std::size_t(path.start.of_job.y - job.y_begin);
-          const auto column = std::size_t(path.start.of_job.x - job.x_begin);
-          output.sums[row * output.stride + column].add(path.result);
-        } else if (path.has_finding) {
-          path.finding.light = path.result.scattered;
-          output.findings->push_back(path.finding);
+        if (output.learning) {
+          const float clamp = path.finds_from > 1 ? settings_.clamp : 0.0f;
+          const Pixel& pixel = path.start.pixel;
+          output.learning->add({pixel.x, pixel.y, path.has_finding(), clamp, path.result},
+                               path.finding);
+          continue;
         }
+        const auto row = std::size_t(path.start.of_job.y - job.y_begin);
+        const auto column = std::size_t(path.start.of_job.x - job.x_begin);
+        output.sums[row * output.stride + column].add(path.result);
       }
       if (settings_.host) settings_.host->stop_if_asked();
     }
@@ -363,14 +371,13 @@ inline bool PathTracer::evaluate_material(Batch& v, std::size_t i) const {
 inline void PathTracer::use_cache(Batch& v, std::size_t i) const {
   Path& path = *v.paths[i];
   const bool is_wanted = (settings_.cache != nullptr) | v.learns;
-  if (!is_wanted || path.has_finding) return;
+  if (!is_wanted || path.has_finding()) return;
   const SurfaceBsdf& s = *v.bsdf[i];
   if (!s.is_rough() || ends_at(path, s)) return;
   const Vec3f weight = path.throughput.cwiseProduct(s.albedo(v.albedo.at(i)));
   if (v.learns) {
-    path.has_finding = true;
+    path.finds_from = path.bounce;
     path.finding = {v.position.at(i), v.normal.at(i), path.since_last, weight, Vec3f::Zero()};
-    path.result.scattered = Vec3f::Zero();  // What comes from here on is what it finds.
     return;
   }
   Vec3f light;
@@ -456,20 +463,18 @@ inline void PathTracer::scatter(Batch& v, std::size_t i) const {
   if (is_first && !s.is_mirror()) {
     record_surface(v, i, s.albedo(v.albedo.at(i)));
   }
-  const bool asks_light = !v.learns || path.has_finding;
   if (!is_first) use_cache(v, i);
   if (v.reuse) share_surface(v, i);
   take_light_samples(v, i);
   path.light_share = path.is_connected && !(path.is_shared && path.bounce == 1)
                          ? share_beside_virtual_lights(v, i)
                          : 1.0f;
-  if (asks_light) queue_shadow_ray(v, i);
+  queue_shadow_ray(v, i);
   path.hides_lights = false;
   path.is_connected = settings_.virtual_lights && !path.ends && !s.is_mirror() &&
                       path.bounce < settings_.max_bounces;
-  // Also from where findings begin: what comes over a further surface belongs to them.
   if (path.is_connected) {
-    v.connections.are_wanted[i] = !v.learns || path.has_finding;
+    v.connections.are_wanted[i] = 1;
     v.connections.throughput.set(i, path.throughput);
     v.connections.own_ways[i] = is_first_shared(v, path, s) ? PathReuse::kOwnWays : 1.0f;
   }
@@ -656,7 +661,11 @@ inline void PathTracer::share_surface(Batch& v, std::size_t i) const {
 
 template <int kPacketSize>
 inline void PathTracer::reuse_paths(std::vector<Path>& paths, Batch& v) const {
-  for (const Path& path : paths) v.reuse->set_found(path.number, path.found);
+  for (const Path& path : paths) {
+    constexpr std::uint32_t kKey = 0x5eed5u;  // Of numbers that nothing else draws.
+    const std::uint32_t bits = hashed_bits(kKey + hashed_bits(path.sampler.place()));
+    v.reuse->set_found(path.number, path.found, PathSampler::fraction(bits));
+  }
   const auto trace = [&](const std::uint8_t* vertices, std::size_t count,
                          const BatchVectors& origin, const BatchVectors& direction,
                          const BatchFloats& reach, auto&& seen) {

@@ -12,6 +12,7 @@
 #include "renderer_support/film.h"
 #include "renderer_support/hit_image.h"
 #include "renderer_support/isa.h"
+#include "renderer_support/learning_paths.h"
 #include "renderer_support/path_settings.h"
 #include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
@@ -72,21 +73,22 @@ class PathTracer {
   /// Where in the picture a pixel of its jobs lies: elsewhere than these say where paths are
   /// reused. `order`: of the jobs.
   Pixel place(const SampleOrder& order, int x, int y) const;
-  /// The means of a picture that these jobs are all of. Adds to `counts`.
-  Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
-  /// What the jobs' paths find for those of the picture. Adds to `counts`.
-  RadianceCache learn(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
+  /// The means of a picture that these jobs are all of, with these samples, too. Adds to `counts`.
+  Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts,
+            const LearningPaths& learning = {}) const;
+  /// The jobs' paths with what they find for those of the picture. Adds to `counts`.
+  LearningPaths learn(std::span<const TraceJob> jobs, Host& host, RayCounts& counts) const;
   /// The light of lamps and sky that these places scatter, each by one light sample; dark ones have
   /// no irradiance. `key` and the numbers from `first` on name the random numbers.
   void light(std::span<const SurfaceParts::Point> places, std::uint32_t key, std::uint32_t first,
              std::span<VirtualLights::Light> lights, RayCounts& counts) const;
 
  private:
-  /// Sums of pixels, or findings.
+  /// Sums of pixels, or paths that learn.
   struct Output {
     PixelSum* sums;
     std::size_t stride;
-    std::vector<RadianceCache::Finding>* findings;
+    LearningPaths::Part* learning;
   };
   struct Path;
   struct StraightPass;

@@ -19,11 +19,12 @@ void count(const std::vector<TraceJob>& jobs, PictureCounts& counts) {
 
 /// `sets`: null where there are no virtual lights.
 Film film_in_rounds(const PathTracer& tracer, const View& view, SamplePlan& plan,
-                    VirtualLightSets* sets, Clock::time_point start, Host& host,
-                    PictureCounts& counts) {
+                    VirtualLightSets* sets, const LearningPaths& learning, Clock::time_point start,
+                    Host& host, PictureCounts& counts) {
   const int width = view.camera().width;
   const int height = view.camera().height;
   Image<PixelSum> sums(width, height, PixelSum{});
+  for (const LearningPaths::Path& path : learning.all()) sums.at(path.x, path.y).add(path.sample);
   for (bool is_first = true;; is_first = false) {
     const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
     const std::vector<TraceJob> jobs = plan.next_round(sums, elapsed);
@@ -57,19 +58,22 @@ Film picture_film(const EmbreeScene& scene, const View& view, TraceSettings sett
       VirtualLightSets::for_picture(scene, view, settings, isa, plan, host, counts.rays);
   if (sets) settings.virtual_lights = &sets->lights();
   std::optional<RadianceCache> cache;
+  LearningPaths learning;
   if (settings.ends_in_cache) {
     const std::vector<TraceJob> jobs = plan.learning_jobs();
-    cache.emplace(PathTracer(scene, view, settings, isa).learn(jobs, host, counts.rays));
+    learning = PathTracer(scene, view, settings, isa).learn(jobs, host, counts.rays);
+    cache.emplace(learning.cache(view.position()));
+    learning.end_in(*cache, host);
     settings.cache = &*cache;
     count(jobs, counts);
   }
   const PathTracer tracer(scene, view, settings, isa);
   if (!plan.has_one_round()) {
-    return film_in_rounds(tracer, view, plan, sets.get(), start, host, counts);
+    return film_in_rounds(tracer, view, plan, sets.get(), learning, start, host, counts);
   }
   const std::vector<TraceJob> jobs = plan.next_round({}, 0.0);
   count(jobs, counts);
-  return tracer.film(jobs, host, counts.rays);
+  return tracer.film(jobs, host, counts.rays, learning);
 }
 
 }  // namespace diorama

@@ -51,13 +51,13 @@ int RadianceCache::widest(const Place& place, float reach) {
   return std::min(place.exponent + kLevels - 1, reached);
 }
 
-RadianceCache::RadianceCache(const Vec3f& eye, std::span<const std::vector<Finding>> findings)
+RadianceCache::RadianceCache(const Vec3f& eye, std::span<const std::span<const Finding>> findings)
     : eye_(eye) {
   fill(known_cells(smallest_cells(findings)));
 }
 
 std::vector<RadianceCache::Sums> RadianceCache::smallest_cells(
-    std::span<const std::vector<Finding>> findings) const {
+    std::span<const std::span<const Finding>> findings) const {
   struct Wanted {
     Place place;
     int widest;
@@ -69,7 +69,7 @@ std::vector<RadianceCache::Sums> RadianceCache::smallest_cells(
   constexpr std::size_t kExpected = 1u << 14;
   std::unordered_map<Wanted, std::size_t, decltype(hash)> numbers(kExpected, hash);
   std::vector<Sums> cells;
-  for (const std::vector<Finding>& part : findings) {
+  for (const std::span<const Finding>& part : findings) {
     for (const Finding& finding : part) {
       const Place place = place_of(finding.position, finding.normal);
       const Wanted wanted{place, widest(place, finding.reach)};

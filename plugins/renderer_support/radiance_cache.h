@@ -28,12 +28,9 @@ class RadianceCache {
     Vec3f light = Vec3f::Zero();     ///< What it brought to the eye by its further way.
   };
 
-  /// Memory that making one takes at most beside its table.
-  static constexpr std::size_t kBytesPerFinding = 256;
-
   /// Cells are larger the farther they are from `eye`. Findings count in their order: equal ones
   /// make equal bytes.
-  RadianceCache(const Vec3f& eye, std::span<const std::vector<Finding>> findings);
+  RadianceCache(const Vec3f& eye, std::span<const std::span<const Finding>> findings);
 
   /// What a weight brings there, as above, to a surface that is `reach` away; false: too little is
   /// known in cells that are no wider than that.
@@ -68,7 +65,7 @@ class RadianceCache {
     Vec3f weight = Vec3f::Zero();
     Vec3f light = Vec3f::Zero();
   };
-  std::vector<Sums> smallest_cells(std::span<const std::vector<Finding>> findings) const;
+  std::vector<Sums> smallest_cells(std::span<const std::span<const Finding>> findings) const;
   static std::vector<Sums> known_cells(std::vector<Sums> cells);
   /// Exponent of the widest cell that counts for a place.
   static int widest(const Place& place, float reach);

@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstring>
+#include <utility>
 
 #include "diorama/error.h"
 #include "gpu_bytes.h"
@@ -107,13 +108,38 @@ void GpuPathTracer::make_columns(std::size_t paths) {
   job_.queues[1] = take(sizeof(std::uint32_t));
 }
 
-RadianceCache GpuPathTracer::learn(std::span<const TraceJob> jobs, Counts& counts) {
+LearningPaths GpuPathTracer::learn(std::span<const TraceJob> jobs, Counts& counts) {
   job_.cache_use = gpu::kCacheLearns;
-  findings_.clear();
+  learning_ = LearningPaths(1);
   const Counts own = trace(jobs);
   counts.rays += own.rays;
   counts.shadow_rays += own.shadow_rays;
-  return {view_->position(), std::span(&findings_, 1)};
+  return std::exchange(learning_, {});
+}
+
+void GpuPathTracer::count(const LearningPaths& paths) {
+  std::vector<gpu::PixelSum> sums(job_.pixel_count);
+  for (const LearningPaths::Path& path : paths.all()) {
+    // As gather.comp does it.
+    gpu::PixelSum& sum = sums[std::size_t(path.y) * job_.width + std::size_t(path.x)];
+    const PathSample& sample = path.sample;
+    ++sum.count;
+    sum.seen += sample.seen;
+    sum.scattered += sample.scattered;
+    const float l = luminance(sample.scattered);
+    const float off = l - sum.mean;
+    sum.mean += off / float(sum.count);
+    sum.squares += off * (l - sum.mean);
+    sum.brightest = std::max(sum.brightest, l);
+    sum.chances += sample.by_chance ? 1 : 0;
+    if (!sample.has_surface) continue;
+    ++sum.surfaces;
+    sum.albedo += sample.albedo;
+    sum.normal += sample.normal;
+    sum.position += sample.position;
+  }
+  device_.upload(std::as_bytes(std::span(sums)), sums_, 0);
+  has_sums_ = true;
 }
 
 void GpuPathTracer::begin(const View& view, const PathSettings& settings, const GpuScene& scene,
@@ -372,23 +398,43 @@ GpuPathTracer::Counts GpuPathTracer::trace(const Pass& pass) {
     host_.stop_if_asked();
     device_.run([&](VulkanCommands& commands) { steps(commands, kFurtherSteps); }, seconds_);
   }
-  if (learns()) read_findings(pass);
+  if (learns()) read_learning_paths(pass);
   return {counters.rays, counters.shadow_rays};
 }
 
-void GpuPathTracer::read_findings(const Pass& pass) {
+void GpuPathTracer::read_learning_paths(const Pass& pass) {
   const std::size_t paths = pass.slots.size() * gpu::kGroup;
   std::vector<gpu::Finding> found(paths);
   device_.download(device_findings_, 0, std::as_writable_bytes(std::span(found)));
-  std::vector<std::array<float, 4>> light(paths);
-  const std::size_t column = std::size_t(job_.capacity) * gpu::kColumnSize;
-  device_.download(columns_, job_.results - columns_.address() + column,
-                   std::as_writable_bytes(std::span(light)));
+  using Column = std::vector<Eigen::Vector4f>;
+  std::array<Column, gpu::kResultColumns> results;
+  for (std::size_t k = 0; k < results.size(); ++k) {
+    results[k].resize(paths);
+    const std::size_t column = k * std::size_t(job_.capacity) * gpu::kColumnSize;
+    device_.download(columns_, job_.results - columns_.address() + column,
+                     std::as_writable_bytes(std::span(results[k])));
+  }
+  const auto& [seen, scattered, normal, position] = results;
   for (std::size_t i = 0; i < paths; ++i) {
+    const gpu::SampleSlot& slot = pass.slots[i / gpu::kGroup];
+    const auto column = std::uint32_t(i % 8);
+    const auto row = std::uint32_t(i % gpu::kGroup / 8);
+    if (column >= slot.columns || row >= slot.rows) continue;
+    LearningPaths::Path path{int(slot.x + column), int(slot.y + row)};
+    path.sample.seen = seen[i].head<3>();
+    path.sample.scattered = scattered[i].head<3>();
+    // See kSurface and kChance of job.glsl.
+    path.sample.has_surface = seen[i].w() == 1.0f || seen[i].w() == 3.0f;
+    path.sample.by_chance = seen[i].w() >= 2.0f;
+    if (path.sample.has_surface) {
+      path.sample.albedo = {scattered[i].w(), normal[i].w(), position[i].w()};
+      path.sample.normal = normal[i].head<3>();
+      path.sample.position = position[i].head<3>();
+    }
     const gpu::Finding& f = found[i];
-    if (f.is_there == 0.0f) continue;
-    findings_.push_back(
-        {f.position, f.normal, f.reach, f.weight, {light[i][0], light[i][1], light[i][2]}});
+    path.has_finding = f.is_there != 0.0f;
+    path.clamp = f.clamp;
+    learning_.part(0).add(path, {f.position, f.normal, f.reach, f.weight, f.light});
   }
 }
 

@@ -14,6 +14,7 @@
 #include "gpu_world.h"
 #include "path_device.h"
 #include "renderer_support/film.h"
+#include "renderer_support/learning_paths.h"
 #include "renderer_support/path_settings.h"
 #include "renderer_support/radiance_cache.h"
 #include "renderer_support/trace_job.h"
@@ -45,8 +46,11 @@ class GpuPathTracer {
   void connect_with(const VirtualLights& lights);
   /// Traces the samples of these jobs. Sums are the same for any division into jobs and passes.
   Counts trace(std::span<const TraceJob> jobs);
-  /// In place of a picture: what the jobs' paths find for those of pictures. Adds to `counts`.
-  RadianceCache learn(std::span<const TraceJob> jobs, Counts& counts);
+  /// In place of a picture: the jobs' paths with what they find for those of pictures. Adds to
+  /// `counts`.
+  LearningPaths learn(std::span<const TraceJob> jobs, Counts& counts);
+  /// Has the picture begun with these samples; to be called before its first trace().
+  void count(const LearningPaths& paths);
   /// The pixels' sums until now.
   Image<PixelSum> sums();
   /// Their means.
@@ -87,7 +91,7 @@ class GpuPathTracer {
   void make_camera_rays(const Pass& pass);
   bool connects() const { return job_.part_triangles != 0; }
   bool learns() const { return job_.cache_use == gpu::kCacheLearns; }
-  void read_findings(const Pass& pass);
+  void read_learning_paths(const Pass& pass);
   void write_inputs(const Pass& pass);
   Counts trace(const Pass& pass);
 
@@ -102,7 +106,7 @@ class GpuPathTracer {
   const GpuScene* scene_ = nullptr;
   double window_ = 0.0;
   bool has_sums_ = false;
-  std::vector<RadianceCache::Finding> findings_;  ///< Where it learns.
+  LearningPaths learning_;  ///< Where it learns.
 
   gpu::Job job_;
   gpu::Push push_;

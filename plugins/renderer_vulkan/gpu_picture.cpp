@@ -27,9 +27,12 @@ void trace_picture(GpuPathTracer& tracer, const GpuScene& scene, const EmbreeSce
   if (settings.ends_in_cache) {
     const std::vector<TraceJob> jobs = plan.learning_jobs();
     GpuPathTracer::Counts own;
-    cache.emplace(tracer.learn(jobs, own));
+    LearningPaths learning = tracer.learn(jobs, own);
+    cache.emplace(learning.cache(view.position()));
+    learning.end_in(*cache, host);
     count(jobs, own);
     tracer.begin(view, settings, scene, meshes.window(), &*cache, sets != nullptr);
+    tracer.count(learning);
   }
   Image<PixelSum> sums;
   for (bool is_first = true;; is_first = false) {

@@ -198,11 +198,11 @@ struct SlotRange {
 };
 
 struct PixelSum {
-  Vec3f seen;
-  Vec3f scattered;
-  Vec3f albedo;
-  Vec3f normal;
-  Vec3f position;
+  Vec3f seen = Vec3f::Zero();
+  Vec3f scattered = Vec3f::Zero();
+  Vec3f albedo = Vec3f::Zero();
+  Vec3f normal = Vec3f::Zero();
+  Vec3f position = Vec3f::Zero();
   float mean = 0.0f;
   float squares = 0.0f;
   float brightest = 0.0f;
@@ -214,16 +214,18 @@ static_assert(sizeof(PixelSum) == 84);
 
 enum CacheUse : std::uint32_t { kNoCache, kCacheLearns, kCacheEnds };
 
-/// What a path that learns for a cache leaves, but for its light; see RadianceCache::Finding.
+/// What a path that learns for a cache finds; see RadianceCache::Finding and LearningPaths::Path.
 struct Finding {
   Vec3f position;
   float is_there;
   Vec3f normal;
   float reach;
   Vec3f weight;
-  float pad_weight;
+  float clamp;
+  Vec3f light;
+  float pad_light;
 };
-static_assert(sizeof(Finding) == 48);
+static_assert(sizeof(Finding) == 64);
 
 /// What kernels read of VirtualLights::Light beside its Candidate.
 struct VirtualLight {

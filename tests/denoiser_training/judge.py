@@ -151,7 +151,7 @@ def main():
         ways[name] = lambda raw, n, e, network=network: denoise(network, raw, n, e)
     table = []
     for path in sorted(options.films.glob("*.films")):
-        values, paths, exposures = read_films(path)
+        values, paths, counted, exposures = read_films(path)
         height, width = values.shape[2:]
         own = {}
         for part in ("own", "planes"):
@@ -168,7 +168,7 @@ def main():
         for i in range(len(paths) - 2):
             raw = films[i : i + 1]
             noisy_raw = plain[i : i + 1]
-            n = torch.tensor([float(paths[i])], device=device)
+            n = torch.tensor([float(counted[i])], device=device)
             e = torch.tensor([exposures[i]], device=device)
             pictures = {}
             with torch.no_grad():

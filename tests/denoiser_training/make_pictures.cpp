@@ -128,7 +128,8 @@ class FilmFile {
   void add(const Film& film, const Image<Vec3f>& by_planes, const Pass& pass, const Vec3f& eye,
            float scale) {
     const auto exposure = float(quiet_exposure(film) / double(scale));
-    put({pass.samples, pass.is_real_time ? 1 : 0, std::bit_cast<std::int32_t>(exposure)});
+    const auto counted = std::int32_t(std::lround(film.at(0, 0).count));  // All pixels alike.
+    put({pass.samples, counted, std::bit_cast<std::int32_t>(exposure)});
     std::vector<std::uint16_t> planes(film.pixels().size() * kChannels);
     for (std::size_t i = 0; i < film.pixels().size(); ++i) {
       const auto values = channels_of(film.pixels()[i], by_planes.pixels()[i], eye, scale);
@@ -230,8 +231,10 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
     if (is_judged) {
       if (bounces > 1) passes.erase(passes.begin());
       passes.push_back({256});
-    } else if (rng.chance(0.2)) {
-      passes.push_back({rng.chance(0.5) ? 64 : 256});
+    } else {
+      // Further noise of the same view costs little.
+      passes.insert(passes.end(), {{2}, {4}});
+      if (rng.chance(0.2)) passes.push_back({rng.chance(0.5) ? 64 : 256});
     }
     // What judges is made as plainly as can be.
     passes.insert(passes.end(), 2, {options.target_paths, false, false, !is_judged});

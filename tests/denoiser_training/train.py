@@ -31,27 +31,29 @@ MOST_NORM = 20.0  # of a gradient, in usual ones
 # How often which number of paths is drawn, where a view has it.
 SHARES = {1: 0.08, 2: 0.26, 4: 0.24, 16: 0.22, 64: 1.0, 256: 2.0}
 OTHER_SHARE = 0.12
-FILMS_PER_VIEW = 5.3  # that are kept, on average ...
-MOST_FILMS = 6  # ... and at most
+FILMS_PER_VIEW = 7.3  # that are kept, on average ...
+MOST_FILMS = 8  # ... and at most
 SIZE = dict(widths=(80, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2, 2, 2))
 
 
 def read_films(path):
-    """-> values [films, CHANNELS, height, width] in half precision, paths, exposures."""
+    """-> values [films, CHANNELS, height, width] in half precision, paths that were asked for, paths
+    with those that learn, exposures."""
     data = path.read_bytes()
     magic, width, height, count, channels = struct.unpack_from("<5i", data)
     if magic != MAGIC or channels != CHANNELS:
         raise ValueError(f"{path}: not a file of films")
     size = channels * width * height
-    values, paths, exposures = [], [], []
+    values, paths, counted, exposures = [], [], [], []
     offset = 20
     for _ in range(count):
-        samples, _, exposure = struct.unpack_from("<2if", data, offset)
+        samples, all_samples, exposure = struct.unpack_from("<2if", data, offset)
         values.append(np.frombuffer(data, "<f2", size, offset + 12))
         paths.append(samples)
+        counted.append(all_samples)
         exposures.append(exposure)
         offset += 12 + 2 * size
-    return np.stack(values).reshape(count, channels, height, width), paths, exposures
+    return np.stack(values).reshape(count, channels, height, width), paths, counted, exposures
 
 
 def edges_of(raw):
@@ -130,7 +132,7 @@ class Pictures:
         self.folder, self.device, self.most = pathlib.Path(folder), device, most
         self.group = group
         self.names = set()
-        self.views = []  # [(number of the film, paths, exposure, its target's other half is apart)]
+        self.views = []  # [(number of the film, paths asked for and all, exposure, its target's other half is apart)]
         self.films = self.targets = None
         self.film_count = 0
         self.is_done = False
@@ -144,19 +146,19 @@ class Pictures:
                 continue
             self.names.add(path.name)
             try:
-                values, paths, exposures = read_films(path)
+                films = read_films(path)
             except (ValueError, struct.error) as error:
                 print(f"{path}: {error}", flush=True)
                 continue
             with self.lock:
-                self.add(values, paths, exposures)
+                self.add(*films)
 
     def is_full(self):
         if self.films is None:
             return False
         return len(self.views) >= self.most or self.film_count + MOST_FILMS > self.films.shape[0]
 
-    def add(self, values, paths, exposures):
+    def add(self, values, paths, counted, exposures):
         count, _, height, width = values.shape
         if self.films is None:
             self.height, self.width = height, width
@@ -180,7 +182,7 @@ class Pictures:
         self.targets[view, 6:7] = edges_of(pair[1:2]).reshape(1, -1).half()
         self.film_count += count - 1
         self.views.append(
-            [(first + i, paths[i], exposures[i], i == count - 2) for i in range(count - 1)]
+            [(first + i, paths[i], counted[i], exposures[i], i == count - 2) for i in range(count - 1)]
         )
 
     def keep_looking(self):
@@ -209,9 +211,9 @@ class Batch:
         floats = np.zeros((size, self.FLOATS), np.float32)
         views = chance.integers(len(pictures.views), size=size)
         for b, view in enumerate(views):
-            films = [f for f in pictures.views[view] if f[1] in SHARES or f[3]]
+            films = [f for f in pictures.views[view] if f[1] in SHARES or f[4]]
             sums = np.cumsum([SHARES.get(f[1], OTHER_SHARE) for f in films])
-            film, paths, exposure, is_apart = films[
+            film, _, paths, exposure, is_apart = films[
                 int(np.searchsorted(sums, chance.random() * sums[-1]))
             ]
             longs[b, 0] = film

@@ -81,7 +81,7 @@ layout(buffer_reference, scalar, buffer_reference_align = 8) readonly buffer Job
   PixelSums sums;
   FilmPixels film;
   Vec4s cache;  // light and key
-  Columns findings;  // three entries per path, where a cache learns
+  Columns findings;  // four entries per path, where a cache learns
   Vec4s candidates;  // position and density, normal and brightness of each virtual light
   VirtualLights virtual_lights;
   Uints part_starts;     // of instances ...
@@ -156,6 +156,7 @@ const float kSurface = 1.0;
 const float kChance = 2.0;
 
 #define STATE(column, path) job.state.v[(column) * job.capacity + (path)]
-// Position and whether there is any, normal and reach, weight.
-#define FINDING(path, entry) job.findings.v[3u * (path) + (entry)]
+// Position and whether there is any, normal and reach, weight and what the cache's light is clamped
+// to, light.
+#define FINDING(path, entry) job.findings.v[4u * (path) + (entry)]
 #define RESULT(column, path) job.results.v[(column) * job.capacity + (path)]

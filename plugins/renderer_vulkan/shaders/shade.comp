@@ -40,6 +40,7 @@ struct Path {
   // What is added to its result.
   vec3 seen;
   vec3 scattered;
+  bool finds;  // which belongs to its finding, begun at an earlier surface
   bool records;
   vec3 albedo;
   vec3 normal;
@@ -53,6 +54,7 @@ struct ShadowRay {
   float reach;
   vec3 light;
   bool is_indirect;
+  bool is_finding;  // belongs to the path's finding
 };
 
 struct SurfacePoint {
@@ -107,6 +109,7 @@ Path load_path(uint index) {
 #endif
   path.seen = vec3(0.0);
   path.scattered = vec3(0.0);
+  path.finds = has(path, kHasFinding);
   path.records = false;
   return path;
 }
@@ -138,7 +141,13 @@ void store_path(uint index, Path path) {
 
 void store_result(uint index, Path path, bool goes_on) {
   if (path.seen != vec3(0.0)) RESULT(0u, index).xyz += path.seen;
-  if (path.scattered != vec3(0.0)) RESULT(1u, index).xyz += path.scattered;
+  if (path.scattered != vec3(0.0)) {
+    if (path.finds) {
+      FINDING(index, 3u).xyz += path.scattered;
+    } else {
+      RESULT(1u, index).xyz += path.scattered;
+    }
+  }
   const bool ends_without = !goes_on && !has(path, kHasSurface);
   if (!path.records && !ends_without) return;
   RESULT(0u, index).w = (path.records ? kSurface : 0.0) + (has(path, kByChance) ? kChance : 0.0);
@@ -364,6 +373,8 @@ void want_light(Path path, vec3 share, vec3 radiance, SurfacePoint s, LightSampl
   shadow.reach = reach;
   shadow.light = path.light_share * path.throughput * share * radiance;
   shadow.is_indirect = path.bounce > 1;
+  // The light sample where the finding begins is the path's own.
+  shadow.is_finding = path.finds;
 }
 
 // Whether the path ends here with light from the cache.
@@ -372,10 +383,7 @@ bool ends_in_cache(inout Path path, uint index, SurfacePoint s, vec3 weight) {
     path.flags |= kHasFinding;
     FINDING(index, 0u) = vec4(s.position, 1.0);
     FINDING(index, 1u) = vec4(s.normal, path.since_last);
-    FINDING(index, 2u) = vec4(weight, 0.0);
-    // What comes from here on is what it finds.
-    path.scattered = vec3(0.0);
-    RESULT(1u, index) = vec4(0.0);
+    FINDING(index, 2u) = vec4(weight, path.bounce > 1 ? job.clamp_to : 0.0);
     return false;
   }
   vec3 light;
@@ -448,7 +456,6 @@ bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface, inout
 
   const bool is_first_surface = !has(path, kHasSurface);
   if (is_first_surface && !is_mirror(bsdf)) record(path, s, albedo(bsdf));
-  const bool asks_light = job.cache_use != kCacheLearns || has(path, kHasFinding);
   if (job.cache_use != 0u && !is_first_surface && !is_last && !has(path, kHasFinding) &&
       is_rough(bsdf)) {
     ends = ends_in_cache(path, index, s, path.throughput * albedo(bsdf));
@@ -460,13 +467,10 @@ bool scatter(inout Path path, uint index, SurfacePoint s, Surface surface, inout
   path.flags &= ~kIsConnected;
   if (!ends && !is_mirror(bsdf) && path.bounce < job.max_bounces) {
     path.flags |= kIsConnected;
-    // Also from where findings begin: what comes over a further surface belongs to them.
-    const bool counts = job.cache_use != kCacheLearns || has(path, kHasFinding);
-    if (counts) connect(path, s, bsdf, basis, u2.y, connection);
+    connect(path, s, bsdf, basis, u2.y, connection);
   }
 #endif
-  if (asks_light && light.density > 0.0 && to_light.z > 0.0 &&
-      dot(s.flat_normal, light.direction) > 0.0) {
+  if (light.density > 0.0 && to_light.z > 0.0 && dot(s.flat_normal, light.direction) > 0.0) {
     const vec4 value = evaluate_lobes(bsdf, to_light);
     const vec3 share = value.xyz * weight_of_light(light.density, probability, !is_last, value.w);
     want_light(path, share, light.radiance, s, light, shadow);
@@ -596,14 +600,14 @@ bool advance(inout Path path, uint index, inout ShadowRay shadow, inout ShadowRa
     RAYS.v[place] = vec4(RAY.origin, RAY.reach);                                      \
     RAYS.v[job.capacity + place] = vec4(                                              \
         RAY.direction, uintBitsToFloat(index | (RAY.is_indirect ? 0x80000000u : 0u))); \
-    RAYS.v[2u * job.capacity + place] = vec4(RAY.light, 0.0);                         \
+    RAYS.v[2u * job.capacity + place] = vec4(RAY.light, RAY.is_finding ? 1.0 : 0.0);  \
   }
 
 void main() {
   const bool is_under_way = gl_GlobalInvocationID.x < job.counters.path_count;
   uint index = 0u;
   bool goes_on = false;
-  ShadowRay shadow = ShadowRay(false, vec3(0.0), vec3(0.0), 0.0, vec3(0.0), false);
+  ShadowRay shadow = ShadowRay(false, vec3(0.0), vec3(0.0), 0.0, vec3(0.0), false, false);
   ShadowRay connection = shadow;
   if (is_under_way) {
     index = job.queues[queue].v[gl_GlobalInvocationID.x];

@@ -78,5 +78,10 @@ void main() {
     const float l = luminance(value);
     if (l > job.clamp_to) value *= job.clamp_to / l;
   }
-  if (value != vec3(0.0)) RESULT(1u, path).xyz += value;
+  if (value == vec3(0.0)) return;
+  if (light.w != 0.0) {
+    FINDING(path, 3u).xyz += value;
+  } else {
+    RESULT(1u, path).xyz += value;
+  }
 }

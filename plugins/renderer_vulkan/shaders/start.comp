@@ -67,7 +67,10 @@ void main() {
   // The others are read where a surface has been recorded.
   RESULT(0u, path) = vec4(0.0);
   RESULT(1u, path) = vec4(0.0);
-  if (job.cache_use == kCacheLearns) FINDING(path, 0u) = vec4(0.0);
+  if (job.cache_use == kCacheLearns) {
+    FINDING(path, 0u) = vec4(0.0);
+    FINDING(path, 3u) = vec4(0.0);
+  }
   const bool is_under_way = start(path);
   uint place;
   APPEND(job.counters.next_count, is_under_way, place)

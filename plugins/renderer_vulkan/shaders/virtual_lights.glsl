@@ -102,6 +102,8 @@ void connect(Path path, SurfacePoint s, Bsdf bsdf, mat3 basis, float u, inout Sh
   connection.light =
       path.throughput * value.xyz * radiance_towards(choice.light, -towards) * weight;
   connection.is_indirect = path.bounce > 0;
+  // Also from where it begins: what comes over a further surface belongs to it.
+  connection.is_finding = has(path, kHasFinding);
 }
 
 // What the light found at a vertex counts for, as virtual lights bring a part of it.

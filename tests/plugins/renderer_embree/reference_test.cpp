@@ -119,8 +119,17 @@ std::vector<Block> flat_blocks(const Image<Vec3f>& picture, int width, int heigh
 /// a thousand paths to tell noise from bias.
 void check_against_reference(const std::string& materials, double tolerance, double most_error) {
   if (!Bench::is_there()) return;
+  // What neighbours share of their errors means of blocks have, too: by as many paths of one picture
+  // a block is off by half a per cent by chance (ADR 0103).
+  constexpr int kPictures = 4;
   Bench bench(materials, 96, true);
-  const Image<Vec3f> ours = bench.picture(11);
+  Image<Vec3f> ours(kWidth, kHeight, Vec3f::Zero());
+  for (std::uint64_t seed = 0; seed < kPictures; ++seed) {
+    const Image<Vec3f> picture = bench.picture(11 + seed);
+    for (std::size_t i = 0; i < ours.pixels().size(); ++i) {
+      ours.pixels()[i] += picture.pixels()[i] / float(kPictures);
+    }
+  }
   const Image<Vec3f>& reference = bench.reference();
   CAPTURE(materials);
 
@@ -180,11 +189,11 @@ void check_single_paths(const std::string& materials, bool reuses_paths, int mos
 }  // namespace
 
 TEST_CASE("a room of matte surfaces is lit as Cycles lights it", "[reference]") {
-  check_against_reference("diffuse", 0.01, 0.002);
+  check_against_reference("diffuse", 0.01, 0.001);
 }
 
 TEST_CASE("a room of principled surfaces is lit as Cycles lights it", "[reference]") {
-  check_against_reference("pbr", 0.015, 0.002);
+  check_against_reference("pbr", 0.01, 0.001);
 }
 
 TEST_CASE("hardly a path is far brighter than its surroundings, none negative or not a number",

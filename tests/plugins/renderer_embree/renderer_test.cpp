@@ -527,6 +527,7 @@ TEST_CASE("paths that end in a cache find the light of whole paths with less noi
   // All pixels share the luck of a cache: one picture's mean is off by a hundredth by chance.
   constexpr int kRuns = 4;
   Vec3 mean = Vec3::Zero();
+  Vec3 mean_of_learning = Vec3::Zero();
   double error_with = 0.0;
   double error_without = 0.0;
   double rays_with = 0.0;
@@ -535,7 +536,16 @@ TEST_CASE("paths that end in a cache find the light of whole paths with less noi
   for (int run = 0; run < kRuns; ++run) {
     const SamplePlan plan = plan_of(16, std::uint64_t(run));
     RayCounts learning;
-    const RadianceCache cache = whole.learn(plan.learning_jobs(), host, learning);
+    LearningPaths paths = whole.learn(plan.learning_jobs(), host, learning);
+    const RadianceCache cache = paths.cache(view.position());
+    paths.end_in(cache, host);
+    double learning_paths = 0.0;
+    Vec3 sum = Vec3::Zero();
+    for (const LearningPaths::Path& path : paths.all()) {
+      sum += path.sample.scattered.cast<double>();
+      ++learning_paths;
+    }
+    mean_of_learning += sum / learning_paths / kRuns;
     settings.cache = &cache;
     const DimPicture with = traced(PathTracer(scene, view, settings, isa), plan, host);
     const DimPicture without = traced(whole, plan, host);
@@ -550,6 +560,8 @@ TEST_CASE("paths that end in a cache find the light of whole paths with less noi
   CAPTURE(error_with, error_without, mean, expected, rays_with, rays_without, rays_to_learn);
   CHECK(mean.mean() == Approx(expected.mean()).epsilon(0.02));
   for (int k = 0; k < 3; ++k) CHECK(mean[k] == Approx(expected[k]).epsilon(0.03));
+  // Paths that learn are samples of their pixels, too; they are a fifth of as many.
+  CHECK(mean_of_learning.mean() == Approx(expected.mean()).epsilon(0.03));
   CHECK(error_with < 0.35 * error_without);
   // Of as many paths.
   CHECK(rays_with < 0.75 * rays_without);

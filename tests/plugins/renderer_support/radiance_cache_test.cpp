@@ -2,6 +2,7 @@
 #include "renderer_support/radiance_cache.h"
 
 #include <algorithm>
+#include <span>
 #include <vector>
 
 #include "diorama/rng.h"
@@ -22,6 +23,11 @@ Vec3f found(const RadianceCache& cache, const Vec3f& position, const Vec3f& norm
   return cache.find(position, normal, reach, light) ? light : Vec3f(Vec3f::Constant(-1.0f));
 }
 
+RadianceCache cache_of(const Vec3f& eye, const std::vector<std::vector<Finding>>& findings) {
+  const std::vector<std::span<const Finding>> parts(findings.begin(), findings.end());
+  return {eye, parts};
+}
+
 const Vec3f kNothing = Vec3f::Constant(-1.0f);
 
 }  // namespace
@@ -31,7 +37,7 @@ TEST_CASE("a cache knows the light over the albedo of what was found there", "[r
   const Vec3f up(0.1f, -0.2f, 0.97f);
   const Finding finding{eye + Vec3f(3.01f, 0.02f, -1.03f), up, 100.0f, Vec3f(0.5f, 0.25f, 0.1f),
                         Vec3f(2.0f, 3.0f, 0.05f)};
-  const RadianceCache cache(eye, repeated(finding, 100));
+  const RadianceCache cache = cache_of(eye, repeated(finding, 100));
   CHECK(found(cache, finding.position, up).isApprox(Vec3f(4.0f, 12.0f, 0.5f)));
   // The same way up, not upside down or sideways; near, not far.
   CHECK(found(cache, finding.position, Vec3f(0.3f, 0.3f, 0.9f)).isApprox(Vec3f(4.0f, 12.0f, 0.5f)));
@@ -51,7 +57,7 @@ TEST_CASE("what is seen from nearby is told by small cells, or not at all", "[ra
     findings[0].push_back(
         {place + off, Vec3f::UnitZ(), 0.05f, Vec3f::Ones(), Vec3f::Constant(50.0f)});
   }
-  const RadianceCache cache(Vec3f::Zero(), findings);
+  const RadianceCache cache = cache_of(Vec3f::Zero(), findings);
   CHECK(found(cache, place, Vec3f::UnitZ(), 0.3f) == Vec3f::Ones());
   CHECK(found(cache, place, Vec3f::UnitZ(), 0.1f) == kNothing);
 }
@@ -61,7 +67,7 @@ TEST_CASE("a cache believes only what was found often enough", "[radiance_cache]
                         Vec3f::Ones()};
   CHECK(found(RadianceCache(Vec3f::Zero(), {}), finding.position, finding.normal) == kNothing);
   for (const int count : {1, 20}) {
-    const RadianceCache cache(Vec3f::Zero(), repeated(finding, count));
+    const RadianceCache cache = cache_of(Vec3f::Zero(), repeated(finding, count));
     CHECK(found(cache, finding.position, finding.normal) == kNothing);
   }
 }
@@ -78,7 +84,7 @@ TEST_CASE("where little was found, wider cells answer", "[radiance_cache]") {
                                             Vec3f::UnitZ(), 100.0f, Vec3f::Constant(0.5f),
                                             Vec3f::Constant(light_at(x))});
   }
-  const RadianceCache cache(Vec3f(0.0f, 0.0f, 1.5f), findings);
+  const RadianceCache cache = cache_of(Vec3f(0.0f, 0.0f, 1.5f), findings);
   int far_known = 0;
   for (int i = 0; i < 200; ++i) {
     const double x = rng.uniform(0.3, 2.0);
@@ -105,9 +111,9 @@ TEST_CASE("cells grow with the distance from the eye", "[radiance_cache]") {
                            Vec3f::Constant(is_lit ? 2.0f : 0.0f)});
   }
   const Vec3f lit(31.5f, 0.0f, 0.0f);
-  const RadianceCache near(Vec3f(31.5f, 0.0f, 3.0f), findings);
+  const RadianceCache near = cache_of(Vec3f(31.5f, 0.0f, 3.0f), findings);
   CHECK(found(near, lit, Vec3f::UnitZ()).x() == Approx(2.0f));
-  const RadianceCache far(Vec3f(31.5f, 0.0f, 900.0f), findings);
+  const RadianceCache far = cache_of(Vec3f(31.5f, 0.0f, 900.0f), findings);
   CHECK(found(far, lit, Vec3f::UnitZ()).x() == Approx(1.0f).margin(0.1));
 }
 
@@ -125,7 +131,7 @@ TEST_CASE("what is met seldom keeps its light beside what is met often", "[radia
                            100.0f, Vec3f::Constant(0.5f), Vec3f::Constant(brightness)});
     light += double(brightness);
   }
-  const RadianceCache cache(Vec3f(0.0f, 0.0f, 1.5f), findings);
+  const RadianceCache cache = cache_of(Vec3f(0.0f, 0.0f, 1.5f), findings);
   double found_light = 0.0;
   for (const Finding& finding : findings[0]) {
     const Vec3f answer = found(cache, finding.position, finding.normal, finding.reach);
@@ -146,8 +152,8 @@ TEST_CASE("equal findings make equal tables, whatever parts they came in", "[rad
   const std::vector<std::vector<Finding>> in_one{all};
   const std::vector<std::vector<Finding>> in_three{
       {all.begin(), all.begin() + 77}, {}, {all.begin() + 77, all.end()}};
-  const RadianceCache one(Vec3f(0.3f, 0.2f, 0.1f), in_one);
-  const RadianceCache three(Vec3f(0.3f, 0.2f, 0.1f), in_three);
+  const RadianceCache one = cache_of(Vec3f(0.3f, 0.2f, 0.1f), in_one);
+  const RadianceCache three = cache_of(Vec3f(0.3f, 0.2f, 0.1f), in_three);
   REQUIRE(one.table().size() == three.table().size());
   std::size_t known = 0;
   for (std::size_t i = 0; i < one.table().size(); ++i) {

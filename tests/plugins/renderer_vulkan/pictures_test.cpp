@@ -1117,12 +1117,14 @@ TEST_CASE("caches learn the same and paths end in them alike on the device", "[v
   const PathSettings settings{.max_bounces = 4};
 
   RayCounts rays;
-  const RadianceCache here =
+  LearningPaths own_paths =
       PathTracer(meshes, view, {settings}, Isa::Sse2).learn(learning, host, rays);
+  const RadianceCache here = own_paths.cache(view.position());
   GpuPathTracer tracer(device, host);
   GpuPathTracer::Counts counts;
   tracer.begin(view, settings, scene, meshes.window());
-  const RadianceCache there = tracer.learn(learning, counts);
+  LearningPaths device_paths = tracer.learn(learning, counts);
+  const RadianceCache there = device_paths.cache(view.position());
   CHECK(counts.rays == Approx(double(rays.rays)).epsilon(0.001));
   CHECK(counts.shadow_rays == Approx(double(rays.shadow_rays)).epsilon(0.001));
   std::size_t known = 0;
@@ -1139,16 +1141,36 @@ TEST_CASE("caches learn the same and paths end in them alike on the device", "[v
   CHECK(known > 20);
   CHECK(unequal <= known / 20);
 
-  // The same cache for both: paths end in it alike.
+  // The same cache for both: paths end in it alike, also those that learnt.
+  own_paths.end_in(here, host);
+  device_paths.end_in(here, host);
+  const auto alone = [&](const LearningPaths& paths) {
+    Image<PixelSum> sums(67, 35, PixelSum());
+    for (const LearningPaths::Path& path : paths.all()) sums.at(path.x, path.y).add(path.sample);
+    Film means(67, 35);
+    for (std::size_t i = 0; i < sums.pixels().size(); ++i) {
+      means.pixels()[i] = sums.pixels()[i].mean();
+    }
+    return means;
+  };
+  const Difference learnt =
+      difference(undenoised(alone(own_paths)), undenoised(alone(device_paths)));
+  CAPTURE(learnt.mean, learnt.unequal);
+  CHECK(learnt.mean < 0.002);
+  CHECK(learnt.unequal < 0.04);
   TraceSettings own{settings};
   own.cache = &here;
-  const Film film = PathTracer(meshes, view, own, Isa::Sse2).film(jobs, host, rays);
+  const Film film = PathTracer(meshes, view, own, Isa::Sse2).film(jobs, host, rays, own_paths);
   tracer.begin(view, settings, scene, meshes.window(), &here);
+  tracer.count(device_paths);
   const auto ended = tracer.trace(jobs);
-  const Difference found = difference(undenoised(film), undenoised(tracer.film()));
+  const Film device_film = tracer.film();
+  const Difference found = difference(undenoised(film), undenoised(device_film));
   CAPTURE(found.mean, found.unequal);
   CHECK(found.mean < 0.001);
   CHECK(found.unequal < 0.02);
+  CHECK(film.at(5, 7).count == 36.0f);
+  CHECK(device_film.at(5, 7).count == 36.0f);
   tracer.begin(view, settings, scene, meshes.window());
   const auto whole = tracer.trace(jobs);
   CHECK(double(ended.rays) < 0.9 * double(whole.rays));
