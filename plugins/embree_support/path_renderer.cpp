@@ -62,8 +62,8 @@ void PictureParams::visit(ParamVisitor& v) {
   v.param(
       "radiance_cache", radiance_cache,
       {"Denoised path_traced pictures: let paths end at their second surface with light that some "
-       "of them found around there; far less noise and time for indirect light that is blurred "
-       "a little."});
+       "further ones found around there, which count for their pixels, too; far less noise and "
+       "time for indirect light that is blurred a little."});
   v.param("virtual_lights", virtual_lights,
           {"Pictures of path_traced: connect paths with bright places on surfaces where lamps "
            "light few of them, so that light that is scattered several times has less noise."});
@@ -133,6 +133,11 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
   std::size_t colors = 0;
   if (channels.contains(kColor.name) || channels.contains(kColorHdr.name)) {
     colors = traced_bytes(pixels);
+    std::size_t learning = 0;
+    if (ends_in_cache()) {
+      learning = std::size_t(SamplePlan::most_learning_paths(pixels, params_.samples));
+      colors += learning * sizeof(LearningPaths::Path);
+    }
     if (filters_film_elsewhere()) {
       colors += pixels * sizeof(Vec3f);
     } else {
@@ -142,11 +147,8 @@ std::size_t PathRenderer::working_bytes(const Camera& camera, const NameSet& cha
                    ? std::max(colors, denoiser_bytes(camera.width, camera.height, is_quick()))
                    : colors + pixels * sizeof(Vec3f);
     }
-    if (ends_in_cache()) {
-      // Before there is a film: what was found, in order, and at most a cell for each.
-      const std::uint64_t paths = SamplePlan::most_learning_paths(pixels, params_.samples);
-      colors = std::max(colors, std::size_t(paths) * LearningPaths::kBytes);
-    }
+    // Before there is a film: what was found, in order, and at most a cell for each.
+    colors = std::max(colors, learning * LearningPaths::kBytes);
     if (params_.mode == "real_time" && params_.samples == 1) {
       colors += pixels * sizeof(RayHit);
     } else if (!traces_elsewhere()) {

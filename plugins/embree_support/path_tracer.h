@@ -73,7 +73,8 @@ class PathTracer {
   /// Where in the picture a pixel of its jobs lies: elsewhere than these say where paths are
   /// reused. `order`: of the jobs.
   Pixel place(const SampleOrder& order, int x, int y) const;
-  /// The means of a picture that these jobs are all of, with these samples, too. Adds to `counts`.
+  /// The means of a picture that these jobs are all of; paths that learnt are samples of it, too.
+  /// Adds to `counts`.
   Film film(std::span<const TraceJob> jobs, Host& host, RayCounts& counts,
             const LearningPaths& learning = {}) const;
   /// The jobs' paths with what they find for those of the picture. Adds to `counts`.

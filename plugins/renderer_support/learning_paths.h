@@ -30,7 +30,6 @@ class LearningPaths {
     void reserve(std::size_t paths);
     /// `finding` counts where the path has one.
     void add(const Path& path, const RadianceCache::Finding& finding);
-    std::span<const Path> paths() const { return paths_; }
 
    private:
     friend class LearningPaths;

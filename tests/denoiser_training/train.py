@@ -515,7 +515,7 @@ def main():
     parser.add_argument("--rate", type=float, default=1e-3)
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--first-views", type=int, default=60, help="training begins with so many")
-    parser.add_argument("--most-views", type=int, default=4500)
+    parser.add_argument("--most-views", type=int, default=3300)
     parser.add_argument("--tell", type=float, default=15.0, help="seconds between lines")
     parser.add_argument("--save-every", type=float, default=60.0, help="seconds")
     parser.add_argument("--no-graphs", dest="graphs", action="store_false",

@@ -119,8 +119,8 @@ std::vector<Block> flat_blocks(const Image<Vec3f>& picture, int width, int heigh
 /// a thousand paths to tell noise from bias.
 void check_against_reference(const std::string& materials, double tolerance, double most_error) {
   if (!Bench::is_there()) return;
-  // What neighbours share of their errors means of blocks have, too: by as many paths of one picture
-  // a block is off by half a per cent by chance (ADR 0103).
+  // Neighbours share a part of their errors, so means of blocks have it, too: in one picture of as
+  // many paths they are off by half a per cent by chance (ADR 0103).
   constexpr int kPictures = 4;
   Bench bench(materials, 96, true);
   Image<Vec3f> ours(kWidth, kHeight, Vec3f::Zero());
