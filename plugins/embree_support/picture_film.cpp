@@ -24,7 +24,8 @@ Film film_in_rounds(const PathTracer& tracer, const View& view, SamplePlan& plan
   const int width = view.camera().width;
   const int height = view.camera().height;
   Image<PixelSum> sums(width, height, PixelSum{});
-  for (const LearningPaths::Path& path : learning.all()) sums.at(path.x, path.y).add(path.sample);
+  learning.for_each(
+      [&](const LearningPaths::Path& path) { sums.at(path.x, path.y).add(path.sample); });
   for (bool is_first = true;; is_first = false) {
     const double elapsed = std::chrono::duration<double>(Clock::now() - start).count();
     const std::vector<TraceJob> jobs = plan.next_round(sums, elapsed);

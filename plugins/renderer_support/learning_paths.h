@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <ranges>
 #include <span>
 #include <vector>
 
@@ -52,8 +51,13 @@ class LearningPaths {
   /// Of each job those paths that lie in it. Both have come from one SamplePlan, whose blocks are
   /// in the same order.
   std::vector<std::span<const Path>> of(std::span<const TraceJob> jobs) const;
-  /// In the order in which they were added.
-  auto all() const { return parts_ | std::views::transform(&Part::paths_) | std::views::join; }
+  /// Calls `take` with each, in the order in which they were added to their parts.
+  template <class Take>
+  void for_each(Take&& take) const {
+    for (const Part& part : parts_) {
+      for (const Path& path : part.paths_) take(path);
+    }
+  }
 
  private:
   std::vector<Part> parts_;

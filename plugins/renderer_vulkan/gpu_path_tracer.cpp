@@ -119,7 +119,7 @@ LearningPaths GpuPathTracer::learn(std::span<const TraceJob> jobs, Counts& count
 
 void GpuPathTracer::count(const LearningPaths& paths) {
   std::vector<gpu::PixelSum> sums(job_.pixel_count);
-  for (const LearningPaths::Path& path : paths.all()) {
+  paths.for_each([&](const LearningPaths::Path& path) {
     // As gather.comp does it.
     gpu::PixelSum& sum = sums[std::size_t(path.y) * job_.width + std::size_t(path.x)];
     const PathSample& sample = path.sample;
@@ -132,12 +132,12 @@ void GpuPathTracer::count(const LearningPaths& paths) {
     sum.squares += off * (l - sum.mean);
     sum.brightest = std::max(sum.brightest, l);
     sum.chances += sample.by_chance ? 1 : 0;
-    if (!sample.has_surface) continue;
+    if (!sample.has_surface) return;
     ++sum.surfaces;
     sum.albedo += sample.albedo;
     sum.normal += sample.normal;
     sum.position += sample.position;
-  }
+  });
   device_.upload(std::as_bytes(std::span(sums)), sums_, 0);
   has_sums_ = true;
 }

@@ -541,10 +541,10 @@ TEST_CASE("paths that end in a cache find the light of whole paths with less noi
     paths.end_in(cache, host);
     double learning_paths = 0.0;
     Vec3 sum = Vec3::Zero();
-    for (const LearningPaths::Path& path : paths.all()) {
+    paths.for_each([&](const LearningPaths::Path& path) {
       sum += path.sample.scattered.cast<double>();
       ++learning_paths;
-    }
+    });
     mean_of_learning += sum / learning_paths / kRuns;
     settings.cache = &cache;
     const DimPicture with = traced(PathTracer(scene, view, settings, isa), plan, host);

@@ -29,7 +29,7 @@ Finding finding_at(const Vec3f& position, float light) {
 
 std::vector<Vec3f> scattered(const LearningPaths& paths) {
   std::vector<Vec3f> result;
-  for (const Path& path : paths.all()) result.push_back(path.sample.scattered);
+  paths.for_each([&](const Path& path) { result.push_back(path.sample.scattered); });
   return result;
 }
 

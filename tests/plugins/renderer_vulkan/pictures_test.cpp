@@ -1146,7 +1146,8 @@ TEST_CASE("caches learn the same and paths end in them alike on the device", "[v
   device_paths.end_in(here, host);
   const auto alone = [&](const LearningPaths& paths) {
     Image<PixelSum> sums(67, 35, PixelSum());
-    for (const LearningPaths::Path& path : paths.all()) sums.at(path.x, path.y).add(path.sample);
+    paths.for_each(
+        [&](const LearningPaths::Path& path) { sums.at(path.x, path.y).add(path.sample); });
     Film means(67, 35);
     for (std::size_t i = 0; i < sums.pixels().size(); ++i) {
       means.pixels()[i] = sums.pixels()[i].mean();
