@@ -423,9 +423,8 @@ void GpuPathTracer::read_learning_paths(const Pass& pass) {
     LearningPaths::Path path{int(slot.x + column), int(slot.y + row)};
     path.sample.seen = seen[i].head<3>();
     path.sample.scattered = scattered[i].head<3>();
-    // See kSurface and kChance of job.glsl.
-    path.sample.has_surface = seen[i].w() == 1.0f || seen[i].w() == 3.0f;
-    path.sample.by_chance = seen[i].w() >= 2.0f;
+    path.sample.has_surface = seen[i].w() != 0.0f && seen[i].w() != gpu::kChance;
+    path.sample.by_chance = seen[i].w() >= gpu::kChance;
     if (path.sample.has_surface) {
       path.sample.albedo = {scattered[i].w(), normal[i].w(), position[i].w()};
       path.sample.normal = normal[i].head<3>();

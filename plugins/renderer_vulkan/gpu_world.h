@@ -332,4 +332,7 @@ inline constexpr std::uint32_t kShadowColumns = 3;
 inline constexpr std::uint32_t kColumnSize = 16;
 inline constexpr std::uint32_t kCameraRaySize = 3 * kColumnSize;
 
+/// Part of what a path's first result has beside the lights seen; see job.glsl.
+inline constexpr float kChance = 2.0f;
+
 }  // namespace diorama::gpu

@@ -37,8 +37,8 @@ SIZE = dict(widths=(80, 64, 80, 80, 64), encoder=(2, 2, 2, 2, 2), decoder=(2, 2,
 
 
 def read_films(path):
-    """-> values [films, CHANNELS, height, width] in half precision, paths that were asked for, paths
-    with those that learn, exposures."""
+    """-> values [films, CHANNELS, height, width] in half precision, paths that were asked for,
+    paths with those that learn, exposures."""
     data = path.read_bytes()
     magic, width, height, count, channels = struct.unpack_from("<5i", data)
     if magic != MAGIC or channels != CHANNELS:
@@ -132,7 +132,8 @@ class Pictures:
         self.folder, self.device, self.most = pathlib.Path(folder), device, most
         self.group = group
         self.names = set()
-        self.views = []  # [(number of the film, paths asked for and all, exposure, its target's other half is apart)]
+        # [(number of the film, paths asked for, all, exposure, its target's other half is apart)]
+        self.views = []
         self.films = self.targets = None
         self.film_count = 0
         self.is_done = False
@@ -182,7 +183,8 @@ class Pictures:
         self.targets[view, 6:7] = edges_of(pair[1:2]).reshape(1, -1).half()
         self.film_count += count - 1
         self.views.append(
-            [(first + i, paths[i], counted[i], exposures[i], i == count - 2) for i in range(count - 1)]
+            [(first + i, paths[i], counted[i], exposures[i], i == count - 2)
+             for i in range(count - 1)]
         )
 
     def keep_looking(self):

@@ -560,7 +560,7 @@ TEST_CASE("paths that end in a cache find the light of whole paths with less noi
   CAPTURE(error_with, error_without, mean, expected, rays_with, rays_without, rays_to_learn);
   CHECK(mean.mean() == Approx(expected.mean()).epsilon(0.02));
   for (int k = 0; k < 3; ++k) CHECK(mean[k] == Approx(expected[k]).epsilon(0.03));
-  // Paths that learn are samples of their pixels, too; they are a fifth of as many.
+  // Paths that learn are samples of their pixels, too; they are an eighth of as many.
   CHECK(mean_of_learning.mean() == Approx(expected.mean()).epsilon(0.03));
   CHECK(error_with < 0.35 * error_without);
   // Of as many paths.

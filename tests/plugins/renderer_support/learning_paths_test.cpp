@@ -39,7 +39,7 @@ TEST_CASE("a path that learns ends in the cache, or with what it found", "[radia
   const Vec3f known = kFrom + Vec3f(3.01f, 0.02f, -1.03f);
   const Vec3f unknown = kFrom + Vec3f(-30.0f, 9.0f, 0.0f);
   LearningPaths paths(3);
-  // Ninety-nine dark findings and a bright one: 0.04 in the mean.
+  // A hundred dark findings there and a bright one.
   paths.part(0).add(path_at(0, 0, true), finding_at(known, 4.0f));
   paths.part(0).add(path_at(1, 0, false), {});
   for (int i = 0; i < 98; ++i) {
