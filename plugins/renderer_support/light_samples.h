@@ -152,20 +152,17 @@ inline void draw_dome(const LightTable& table, std::uint32_t number, const Light
                       const BatchFloats& u, const BatchFloats& v, LightSamples& samples) {
   const LightTable::Record& light = table.records()[number];
   std::array<std::uint8_t, kBatch> index;
-  BatchVectors from;
   std::size_t count = 0;
   for (std::size_t i = 0; i < queries.count; ++i) {
     index[count] = std::uint8_t(i);
-    from.set(count, queries.position.at(i));
     count += samples.light[i] == std::int32_t(number) ? 1 : 0;
   }
-  const std::size_t size = whole_steps(count);
   BatchInts cells;
-  light.sky->grid().find_cells(from, size, cells);
+  light.sky->grid().find_cells(queries.position, whole_steps(queries.count), cells);
   // In steps, each of which knows what the next one reads.
   std::array<SkyGrid::Choice, kBatch> choices;
   for (std::size_t k = 0; k < count; ++k) {
-    choices[k] = light.sky->choose(std::uint32_t(cells[k]), u[index[k]]);
+    choices[k] = light.sky->choose(std::uint32_t(cells[index[k]]), u[index[k]]);
   }
   BatchFloats rows;
   for (std::size_t k = 0; k < count; ++k) {
@@ -187,7 +184,7 @@ inline void draw_dome(const LightTable& table, std::uint32_t number, const Light
   const Basis axes{light.dome_from_world.row(0), light.dome_from_world.row(1),
                    light.dome_from_world.row(2)};
   BatchVectors directions;
-  for (std::size_t k = 0; k < size; ++k) {
+  for (std::size_t k = 0; k < whole_steps(count); ++k) {
     const DomeTexture::Towards towards = DomeTexture::towards({x[k], y[k]});
     directions.set(k, unit(axes.to_world(towards.direction)));
     density[k] *= towards.per_solid_angle;
