@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
+#include <type_traits>
 
 #include "diorama/error.h"
 #include "diorama/image.h"
@@ -26,6 +28,33 @@ void check(const Texture& texture) {
                                     std::to_string(texture.bytes.size()) + " bytes and " +
                                     std::to_string(texture.floats.size()) +
                                     " floats; one of them must fit the size");
+}
+
+/// As Rgba, but made in a register: compilers write an Eigen vector's numbers to memory one by one,
+/// and to read them at once then waits for all.
+using Values = float __attribute__((vector_size(16)));
+
+Rgba rgba(const Values& values) {
+  Rgba result;
+  std::memcpy(result.data(), &values, sizeof(values));
+  return result;
+}
+
+Values values_of(const Rgba& rgba) { return Values{rgba[0], rgba[1], rgba[2], rgba[3]}; }
+
+Values linear_values(const std::uint8_t* texel, int channels,
+                     const std::array<float, 256>& linear) {
+  const float red = linear[texel[0]];
+  if (channels < 3) return Values{red, red, red, channels == 2 ? float(texel[1]) / 255.0f : 1.0f};
+  return Values{red, linear[texel[1]], linear[texel[2]],
+                channels == 4 ? float(texel[3]) / 255.0f : 1.0f};
+}
+
+Values linear_values(const float* texel, int channels, bool is_srgb) {
+  const auto linear = [&](float v) { return is_srgb ? linear_from_srgb(v) : v; };
+  const float red = linear(texel[0]);
+  if (channels < 3) return Values{red, red, red, channels == 2 ? texel[1] : 1.0f};
+  return Values{red, linear(texel[1]), linear(texel[2]), channels == 4 ? texel[3] : 1.0f};
 }
 
 std::uint64_t next_number() {
@@ -116,6 +145,89 @@ void MipTexture::add_level() {
         });
   }
   levels_.push_back(std::move(level));
+}
+
+int MipTexture::wrapped(int i, int size, Wrap wrap) {
+  if (unsigned(i) < unsigned(size)) return i;
+  switch (wrap) {
+    case Wrap::Black:
+      return -1;
+    case Wrap::Clamp:
+      return std::clamp(i, 0, size - 1);
+    case Wrap::Mirror: {
+      const int k = ((i % (2 * size)) + 2 * size) % (2 * size);
+      return k < size ? k : 2 * size - 1 - k;
+    }
+    case Wrap::Repeat:
+      break;
+  }
+  return i < 0 ? i + size : i - size;  // at most one step outside, see bilinear()
+}
+
+Rgba MipTexture::texel(int index, int x, int y) const {
+  const Level& level = levels_[std::size_t(index)];
+  const int channels = source_->channels;
+  const std::size_t at =
+      (std::size_t(y) * std::size_t(level.width) + std::size_t(x)) * std::size_t(channels);
+  if (source_->bytes.empty()) {
+    return rgba(linear_values(floats_of(index) + at, channels, has_srgb_floats(index)));
+  }
+  return rgba(linear_values(bytes(index).data() + at, channels, *linear_from_byte_));
+}
+
+Rgba MipTexture::bilinear(int index, const Vec2f& uv, Wrap wrap_u, Wrap wrap_v) const {
+  const Level& level = levels_[std::size_t(index)];
+  constexpr float kLimit = 1e8f;  // far outside any sane coordinate, inside int
+  // Without the library's floor, which is a call on old processors.
+  const auto rounded_down = [](float v) { return int(v) - int(v < 0.0f); };
+  const auto texels = [&](float v, int size, Wrap wrap) {
+    const float limited = std::clamp(v, -kLimit, kLimit);
+    const float within = wrap == Wrap::Repeat ? limited - float(rounded_down(limited)) : limited;
+    return std::clamp(within * float(size) - 0.5f, -kLimit, kLimit);
+  };
+  const float x = texels(uv.x(), level.width, wrap_u);
+  const float y = texels(1.0f - uv.y(), level.height, wrap_v);
+  const int left = rounded_down(x);
+  const int above = rounded_down(y);
+  const float fx = x - float(left);
+  const float fy = y - float(above);
+  const int x0 = wrapped(left, level.width, wrap_u);
+  const int x1 = wrapped(left + 1, level.width, wrap_u);
+  const int y0 = wrapped(above, level.height, wrap_v);
+  const int y1 = wrapped(above + 1, level.height, wrap_v);
+  const auto blend = [&](const auto& get) {
+    const auto top = get(x0, y0) * (1.0f - fx) + get(x1, y0) * fx;
+    const auto bottom = get(x0, y1) * (1.0f - fx) + get(x1, y1) * fx;
+    return Values(top * (1.0f - fy) + bottom * fy);
+  };
+  if (std::min({x0, x1, y0, y1}) < 0) {
+    return rgba(blend(
+        [&](int u, int v) { return u < 0 || v < 0 ? Values{} : values_of(texel(index, u, v)); }));
+  }
+  // Nothing is asked four times.
+  const auto blend_from = [&](const auto* values, auto channels, const auto& linear) {
+    const auto width = std::size_t(level.width);
+    return rgba(blend([&](int u, int v) {
+      const std::size_t at = std::size_t(v) * width + std::size_t(u);
+      return linear_values(values + at * channels, channels, linear);
+    }));
+  };
+  const auto blend_channels = [&](auto channels) {
+    if (source_->bytes.empty()) {
+      return blend_from(floats_of(index), channels, has_srgb_floats(index));
+    }
+    return blend_from(bytes(index).data(), channels, *linear_from_byte_);
+  };
+  switch (source_->channels) {
+    case 1:
+      return blend_channels(std::integral_constant<int, 1>());
+    case 2:
+      return blend_channels(std::integral_constant<int, 2>());
+    case 3:
+      return blend_channels(std::integral_constant<int, 3>());
+    default:
+      return blend_channels(std::integral_constant<int, 4>());
+  }
 }
 
 }  // namespace diorama

@@ -55,6 +55,11 @@ class MipTexture {
   };
 
   Rgba bilinear(int level, const Vec2f& uv, Wrap wrap_u, Wrap wrap_v) const;
+  const float* floats_of(int level) const {
+    return level == 0 ? source_->floats.data() : levels_[std::size_t(level)].floats.data();
+  }
+  /// Smaller versions are linear.
+  bool has_srgb_floats(int level) const { return level == 0 && is_srgb(); }
   /// -1: outside a texture that is black outside.
   static int wrapped(int i, int size, Wrap wrap);
   void add_level();
@@ -70,6 +75,7 @@ class MipTexture {
 struct TextureSlot {
   const TextureInput* input = nullptr;
   const MipTexture* texture = nullptr;
+  float uv_per_mesh_uv = input ? scale_of(input->uv_from_mesh_uv) : 1.0f;  ///< Of lengths.
 
   explicit operator bool() const { return texture != nullptr; }
   /// Scaled and biased. `uv_footprint` is in mesh uv units.
@@ -77,44 +83,12 @@ struct TextureSlot {
   float scalar(const Vec2f& mesh_uv, float uv_footprint) const {
     return at(mesh_uv, uv_footprint)[input->channel];
   }
+
+ private:
+  static float scale_of(const Eigen::Matrix<float, 2, 3>& map) {
+    return std::sqrt(std::abs(map(0, 0) * map(1, 1) - map(0, 1) * map(1, 0)));
+  }
 };
-
-inline int MipTexture::wrapped(int i, int size, Wrap wrap) {
-  if (unsigned(i) < unsigned(size)) return i;
-  switch (wrap) {
-    case Wrap::Black:
-      return -1;
-    case Wrap::Clamp:
-      return std::clamp(i, 0, size - 1);
-    case Wrap::Mirror: {
-      const int k = ((i % (2 * size)) + 2 * size) % (2 * size);
-      return k < size ? k : 2 * size - 1 - k;
-    }
-    case Wrap::Repeat:
-      break;
-  }
-  return i < 0 ? i + size : i - size;  // at most one step outside, see bilinear()
-}
-
-inline Rgba MipTexture::texel(int index, int x, int y) const {
-  const Level& level = levels_[std::size_t(index)];
-  const int channels = source_->channels;
-  const std::size_t at =
-      (std::size_t(y) * std::size_t(level.width) + std::size_t(x)) * std::size_t(channels);
-  if (!source_->bytes.empty()) {
-    const std::uint8_t* p = (index == 0 ? source_->bytes.data() : level.bytes.data()) + at;
-    const auto& linear = *linear_from_byte_;
-    const float red = linear[p[0]];
-    if (channels < 3) return {red, red, red, channels == 2 ? float(p[1]) / 255.0f : 1.0f};
-    return {red, linear[p[1]], linear[p[2]], channels == 4 ? float(p[3]) / 255.0f : 1.0f};
-  }
-  const float* p = (index == 0 ? source_->floats.data() : level.floats.data()) + at;
-  const bool decode = index == 0 && source_->color_space == ColorSpace::Srgb;
-  const auto linear = [&](float v) { return decode ? linear_from_srgb(v) : v; };
-  const float red = linear(p[0]);
-  if (channels < 3) return {red, red, red, channels == 2 ? p[1] : 1.0f};
-  return {red, linear(p[1]), linear(p[2]), channels == 4 ? p[3] : 1.0f};
-}
 
 inline void MipTexture::prefetch(const Vec2f& uv) const {
   const int x = std::clamp(int(uv.x() * float(width()) - 0.5f), 0, width() - 1);
@@ -128,36 +102,6 @@ inline void MipTexture::prefetch(const Vec2f& uv) const {
   };
   fetch(source_->bytes);
   fetch(source_->floats);
-}
-
-[[gnu::noinline]] inline Rgba MipTexture::bilinear(int index, const Vec2f& uv, Wrap wrap_u,
-                                                   Wrap wrap_v) const {
-  const Level& level = levels_[std::size_t(index)];
-  constexpr float kLimit = 1e8f;  // far outside any sane coordinate, inside int
-  // Without the library's floor, which is a call on old processors.
-  const auto rounded_down = [](float v) { return int(v) - int(v < 0.0f); };
-  const auto texels = [&](float v, int size, Wrap wrap) {
-    const float limited = std::clamp(v, -kLimit, kLimit);
-    const float within = wrap == Wrap::Repeat ? limited - float(rounded_down(limited)) : limited;
-    return std::clamp(within * float(size) - 0.5f, -kLimit, kLimit);
-  };
-  const float x = texels(uv.x(), level.width, wrap_u);
-  const float y = texels(1.0f - uv.y(), level.height, wrap_v);
-  const int left = rounded_down(x);
-  const int above = rounded_down(y);
-  const float fx = x - float(left);
-  const float fy = y - float(above);
-  const int x0 = wrapped(left, level.width, wrap_u);
-  const int x1 = wrapped(left + 1, level.width, wrap_u);
-  const int y0 = wrapped(above, level.height, wrap_v);
-  const int y1 = wrapped(above + 1, level.height, wrap_v);
-  const auto get = [&](int u, int v) -> Rgba {
-    if (u < 0 || v < 0) return Rgba::Zero();
-    return texel(index, u, v);
-  };
-  const Rgba top = get(x0, y0) * (1.0f - fx) + get(x1, y0) * fx;
-  const Rgba bottom = get(x0, y1) * (1.0f - fx) + get(x1, y1) * fx;
-  return top * (1.0f - fy) + bottom * fy;
 }
 
 inline Rgba MipTexture::lookup(const Vec2f& uv, float footprint, Wrap wrap_u, Wrap wrap_v) const {
@@ -174,10 +118,11 @@ inline Rgba MipTexture::lookup(const Vec2f& uv, float footprint, Wrap wrap_u, Wr
 inline Rgba TextureSlot::at(const Vec2f& mesh_uv, float uv_footprint) const {
   const auto& map = input->uv_from_mesh_uv;
   const Vec2f uv = map.leftCols<2>() * mesh_uv + map.col(2);
-  const float scale = std::sqrt(std::abs(map(0, 0) * map(1, 1) - map(0, 1) * map(1, 0)));
-  const Rgba value = texture->lookup(uv, uv_footprint * scale, input->wrap_u, input->wrap_v);
-  return value * Rgba(input->scale[0], input->scale[1], input->scale[2], input->scale[3]) +
-         Rgba(input->bias[0], input->bias[1], input->bias[2], input->bias[3]);
+  const float footprint = uv_footprint * uv_per_mesh_uv;
+  const Rgba value = texture->lookup(uv, footprint, input->wrap_u, input->wrap_v);
+  // Read at once: Eigen writes four numbers to memory one by one, and reading them waits for that.
+  const auto all = [](const std::array<float, 4>& v) { return Eigen::Map<const Rgba>(v.data()); };
+  return value * all(input->scale) + all(input->bias);
 }
 
 }  // namespace diorama
