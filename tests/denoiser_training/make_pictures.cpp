@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "channels.h"
+#include "embree_support/path_starts.h"
 #include "gpu_path_tracer.h"
 #include "gpu_picture.h"
 #include "gpu_scene.h"
@@ -39,6 +40,7 @@ struct Pass {
   bool is_real_time = false;       ///< Through the pixels' centres, half of the bounces.
   bool ends_in_cache = true;       ///< As the paths of denoised pictures do.
   bool has_virtual_lights = true;  ///< As all but quick pictures.
+  bool reuses_paths = false;       ///< As pictures with `denoise: false`, by the processor.
 };
 
 /// Traces the paths of one scene, on the processor or on a GPU.
@@ -62,7 +64,13 @@ class Tracer {
     settings.ends_in_cache = pass.ends_in_cache && max_bounces > 1;
     if (pass.is_real_time || settings.ends_in_cache) settings.continuation = kShortContinuation;
     settings.has_virtual_lights = pass.has_virtual_lights && !pass.is_real_time && max_bounces > 0;
-    SamplePlan plan(view.camera().width, view.camera().height, {pass.samples}, seed);
+    settings.reuses_paths =
+        pass.reuses_paths && !on_device_ && max_bounces > 0 && !view.has_shutter();
+    const int width = view.camera().width;
+    const int height = view.camera().height;
+    SamplePlan::Limits limits{pass.samples};
+    if (settings.reuses_paths) PixelTiles::of_picture(width, height).set_blocks(limits);
+    SamplePlan plan(width, height, limits, seed);
     PictureCounts counts;
     if (on_device_) {
       trace_picture(on_device_->tracer, on_device_->scene, meshes_, view, settings, isa_, plan,
@@ -167,7 +175,7 @@ struct Options {
   int target_paths = 32;
   int bounces = 6;
   int device = -1;
-  bool plain_with_virtual_lights = false;
+  bool is_plain_undenoised = false;  ///< As `denoise: false` makes pictures.
   double seconds = 1e9;
   int threads = 1;
 };
@@ -244,7 +252,8 @@ void render_set(const Set& set, std::uint64_t seed, const Options& options, Host
       const std::uint64_t own_seed = rng.bits();
       films.push_back(tracer.trace(view, pass, bounces, own_seed));
       if (is_judged && plain.size() + 2 < passes.size()) {
-        const Pass own{pass.samples, pass.is_real_time, false, options.plain_with_virtual_lights};
+        const Pass own{pass.samples, pass.is_real_time, false, options.is_plain_undenoised,
+                       options.is_plain_undenoised};
         plain.push_back(tracer.trace(view, own, bounces, own_seed));
       }
       if (films.size() == 2 && !is_judged && !is_worthy(films.back(), view.position())) break;
@@ -311,12 +320,13 @@ int main(int argc, char** argv) {
   app.add_option("--target-paths", options.target_paths,
                  "Of each of the two films to compare with");
   app.add_option("--bounces", options.bounces, "Of what is judged by; few: as in real time, too");
-  app.add_flag("--virtual-lights", options.plain_with_virtual_lights,
-               "Let films for other denoisers have them, too");
   app.add_option("--seconds", options.seconds, "No further set is begun after that");
   app.add_option("--threads", options.threads);
   app.add_option("--device", options.device,
                  "Number of the Vulkan device that traces the paths; the processor by default");
+  app.add_flag("--as-undenoised", options.is_plain_undenoised,
+               "Films for other denoisers are those of pictures with denoise: false")
+      ->excludes("--device");
   CLI11_PARSE(app, argc, argv);
   try {
     make(options);

@@ -50,6 +50,44 @@ TEST_CASE("wrapping decides what lies outside", "[texture]") {
   CHECK(red(texture, -0.5f / 3, 0.75f, Wrap::Mirror) == Approx(10.0f).margin(1e-3));
 }
 
+TEST_CASE("all kinds of textures are read: grey is repeated, missing alpha is 1", "[texture]") {
+  const int channels = GENERATE(1, 2, 3, 4);
+  const bool has_bytes = GENERATE(true, false);
+  const auto space = GENERATE(ColorSpace::Linear, ColorSpace::Srgb);
+  CAPTURE(channels, has_bytes, space == ColorSpace::Srgb);
+  Texture source;
+  source.width = source.height = 2;
+  source.channels = channels;
+  source.color_space = space;
+  const auto byte = [&](int x, int y, int c) { return 20 * c + 70 * x + 90 * y + 11; };
+  for (int i = 0; i < 4 * channels; ++i) {
+    const int value = byte(i / channels % 2, i / channels / 2, i % channels);
+    if (has_bytes) {
+      source.bytes.push_back(std::uint8_t(value));
+    } else {
+      source.floats.push_back(float(value) / 255.0f);
+    }
+  }
+  const MipTexture texture(source);
+  const auto wanted = [&](int x, int y, int c) {  // Of red, green, blue and alpha.
+    const bool has_alpha = channels % 2 == 0;
+    if (c == 3 && !has_alpha) return 1.0f;
+    const float value = float(byte(x, y, c == 3 ? channels - 1 : channels < 3 ? 0 : c)) / 255.0f;
+    return space == ColorSpace::Srgb && c < 3 ? linear_from_srgb(value) : value;
+  };
+  for (int c = 0; c < 4; ++c) {
+    CAPTURE(c);
+    // A quarter of a texel right of the centre of the lower left one, and up.
+    const Rgba found = texture.lookup({0.375f, 0.375f}, 0.0f, Wrap::Clamp, Wrap::Clamp);
+    const float low = 0.75f * wanted(0, 1, c) + 0.25f * wanted(1, 1, c);
+    const float high = 0.75f * wanted(0, 0, c) + 0.25f * wanted(1, 0, c);
+    CHECK(found[c] == Approx(0.75f * low + 0.25f * high).margin(1e-5));
+    // Half outside, where nothing is.
+    const Rgba border = texture.lookup({0.0f, 0.25f}, 0.0f, Wrap::Black, Wrap::Clamp);
+    CHECK(border[c] == Approx(0.5f * wanted(0, 1, c)).margin(1e-5));
+  }
+}
+
 TEST_CASE("averages are made in linear light and reach the mean", "[texture]") {
   const auto source = small_texture(ColorSpace::Srgb);
   const MipTexture texture(*source);
@@ -84,6 +122,23 @@ TEST_CASE("an input scales, shifts and maps uv", "[texture]") {
   const MipTexture texture(*input.texture);
   const TextureSlot slot{&input, &texture};
   CHECK(slot.at({0.5f / 3, 0.75f}, 0.0f)[0] == Approx(2.0f * 20.0f / 255.0f + 0.1f).margin(1e-4));
+}
+
+TEST_CASE("averages are as wide as the mapped uv makes them", "[texture]") {
+  auto source = std::make_shared<Texture>();
+  source->width = source->height = 64;
+  source->channels = 1;
+  for (int i = 0; i < 64 * 64; ++i) source->bytes.push_back(std::uint8_t(i * i % 251));
+  TextureInput input;
+  input.texture = source;
+  input.uv_from_mesh_uv << 0.0f, -8.0f, 0.25f, 2.0f, 0.0f, 0.0f;  // Turned, lengths four times.
+  const MipTexture texture(*source);
+  const TextureSlot slot{&input, &texture};
+  const Vec2f mesh_uv(0.1f, -0.01f);
+  const Vec2f uv(0.33f, 0.2f);
+  const Rgba wanted = texture.lookup(uv, 0.5f, Wrap::Repeat, Wrap::Repeat);
+  CHECK(slot.scalar(mesh_uv, 0.125f) == Approx(wanted[0]).margin(1e-5));
+  CHECK(slot.scalar(mesh_uv, 0.0f) != Approx(wanted[0]).margin(1e-2));
 }
 
 TEST_CASE("a texture whose data does not fit its size is refused by name", "[texture]") {
