@@ -204,7 +204,7 @@ Rgba MipTexture::bilinear(int index, const Vec2f& uv, Wrap wrap_u, Wrap wrap_v) 
     return rgba(blend(
         [&](int u, int v) { return u < 0 || v < 0 ? Values{} : values_of(texel(index, u, v)); }));
   }
-  // Nothing is asked four times.
+  // Nothing is asked four times: with borders looked for here, whole pictures took 1 % longer.
   const auto blend_from = [&](const auto* values, auto channels, const auto& linear) {
     const auto width = std::size_t(level.width);
     return rgba(blend([&](int u, int v) {

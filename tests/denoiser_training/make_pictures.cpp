@@ -64,8 +64,7 @@ class Tracer {
     settings.ends_in_cache = pass.ends_in_cache && max_bounces > 1;
     if (pass.is_real_time || settings.ends_in_cache) settings.continuation = kShortContinuation;
     settings.has_virtual_lights = pass.has_virtual_lights && !pass.is_real_time && max_bounces > 0;
-    settings.reuses_paths =
-        pass.reuses_paths && !on_device_ && max_bounces > 0 && !view.has_shutter();
+    settings.reuses_paths = pass.reuses_paths && max_bounces > 0 && !view.has_shutter();
     const int width = view.camera().width;
     const int height = view.camera().height;
     SamplePlan::Limits limits{pass.samples};
